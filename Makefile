@@ -1,14 +1,188 @@
-# dempm. `make` builds build/dempm; see README.md for the rest. DEPS=no: never install packages.
+# dempm. `make help` lists the targets. Debian packages that are missing get installed; DEPS=no refuses instead.
+
 BUILD ?= build
+PREFIX ?= /usr/local
 CC = gcc
-CXX = g++
 MPICC ?= mpicc
 MPICXX ?= mpicxx
-WERROR ?=
+MPIRUN ?= mpirun
+PYTHON ?= /usr/bin/python3#        Debian's: another python in PATH would lack Debian's numpy and vtk
+NVCC ?= $(firstword $(wildcard $(shell command -v nvcc) /usr/local/cuda/bin/nvcc))
+OPT ?= -O3 -g
+WERROR ?=#                         -Werror in .ci/run
 SANITIZE ?=
-OPT ?= -O2 -g
-WARN = -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Wvla $(WERROR)
-CXXWARN = -Wall -Wextra $(WERROR)
-# No errno and no traps from arithmetic, and no contraction: the same bits from vector and scalar loops.
+DEPS ?= yes
+
+.DEFAULT_GOAL := all
+.DELETE_ON_ERROR:
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules
+PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize check-cuda install clean help deps programs \
+         FORCE
+
+# ---------------------------------------------------------------------------------------------------------------- flags
+WARN = -Wall -Wextra -Wpedantic -Wshadow -Wvla $(WERROR)
+# No errno and no traps from arithmetic, no contraction: vector and scalar loops then give the same bits.
 NUMERIC = -fno-math-errno -fno-trapping-math -ffp-contract=off
-CFLAGS_ALL = -std=c17 $(OPT) $(WARN) $(NUMERIC) -fPIC -fopenmp $(SANITIZE) $(CFLAGS)
+COMMON = $(OPT) $(NUMERIC) -fPIC -fopenmp -MMD -MP $(SANITIZE) $(if $(CU_SOURCES),-DDEMPM_CUDA)
+C_FLAGS = -std=c17 $(WARN) -Wstrict-prototypes $(COMMON) $(CFLAGS)
+# Headers of LIGGGHTS and VTK are not ours: -isystem keeps their warnings out. Found late: `deps` may just have
+# installed them.
+VTK_INCLUDE = $(shell ls -d /usr/include/vtk-9* 2>/dev/null | head -1)
+VTK_SUFFIX = $(patsubst vtk-%,%,$(notdir $(VTK_INCLUDE)))
+CXX_FLAGS = -std=c++17 -Wall -Wextra -Wshadow $(WERROR) $(COMMON) -isystem /usr/include/liggghts \
+            -isystem $(VTK_INCLUDE) $(CXXFLAGS)
+VTK_LIBS = $(patsubst %,-lvtk%-$(VTK_SUFFIX),IOXML IOXMLParser IOCore CommonExecutionModel CommonDataModel \
+             CommonTransforms CommonMath CommonMisc CommonSystem CommonCore sys)
+CUDA_HOME = $(patsubst %/bin/nvcc,%,$(realpath $(NVCC)))
+CUDA_LIBS = $(if $(CU_SOURCES),-L$(firstword $(wildcard $(CUDA_HOME)/lib64 $(CUDA_HOME)/targets/*/lib)) \
+              -lcudart_static -ldl -lrt -lpthread)
+CUDA_ARCHS = $(filter 80 90 100,$(patsubst compute_%,%,$(shell $(NVCC) --list-gpu-arch)))
+NVCC_FLAGS = -std=c++17 -O3 -lineinfo $(foreach a,$(CUDA_ARCHS),-gencode arch=compute_$(a),code=sm_$(a)) \
+             -gencode arch=compute_$(lastword $(CUDA_ARCHS)),code=compute_$(lastword $(CUDA_ARCHS)) \
+             -Xcompiler -fPIC,-fopenmp,-Wall,-Wextra -DDEMPM_CUDA
+C_LIBS = $(CUDA_LIBS) $(if $(CU_SOURCES),-lstdc++) -lm
+ALL_LIBS = -lliggghts $(VTK_LIBS) $(C_LIBS)
+
+# -------------------------------------------------------------------------------------------------------------- sources
+C_SOURCES := $(filter-out %_main.c %/rve_backend_cpu.c,$(wildcard src/base/*.c src/mpm/*.c src/cuda_rve/*.c))
+MPI_SOURCES := $(wildcard src/fix_mpm_couple/*.c)
+CXX_SOURCES := $(filter-out %/main.cpp,$(wildcard src/fix_mpm_couple/*.cpp))
+CU_SOURCES := $(if $(NVCC),$(wildcard src/cuda_rve/*.cu))
+# The RVE kernels once per instruction set, chosen at run time.
+KERNEL_SOURCE := $(wildcard src/cuda_rve/rve_backend_cpu.c)
+ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512)
+ISA_plain =
+ISA_avx2 = -mavx2
+ISA_avx512 = -mavx512f -mavx512dq -mavx512vl -mavx512bw -mprefer-vector-width=512
+KERNEL_OBJECTS := $(if $(KERNEL_SOURCE),$(ISAS:%=$(BUILD)/isa/%.o))
+
+LIBRARY := $(BUILD)/libdempm.a
+C_OBJECTS := $(C_SOURCES:src/%.c=$(BUILD)/%.o) $(KERNEL_OBJECTS) $(CU_SOURCES:src/%.cu=$(BUILD)/%.cu.o)
+MPI_OBJECTS := $(MPI_SOURCES:src/%.c=$(BUILD)/%.o) $(CXX_SOURCES:src/%.cpp=$(BUILD)/%.o)
+PROGRAMS := $(if $(wildcard src/fix_mpm_couple/main.cpp),$(BUILD)/dempm) \
+            $(if $(wildcard src/cuda_rve/rve_pack_main.c),$(BUILD)/dempm-pack)
+TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c)) \
+         $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
+BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
+
+# ------------------------------------------------------------------------------------------------------- compile, link
+all: programs
+programs: $(PROGRAMS) $(LIBRARY)
+
+# Objects depend on the packages' stamp by order only, and on a file that changes when the flags do.
+READY = $(BUILD)/flags | $(BUILD)/packages
+$(BUILD)/flags: FORCE | $(BUILD)/packages
+	@mkdir -p $(@D); echo '$(C_FLAGS) | $(CXX_FLAGS) | $(NVCC_FLAGS)' > $@.now; \
+	 if cmp -s $@ $@.now; then rm $@.now; else mv $@.now $@; fi
+
+$(BUILD)/%.o: src/%.c $(READY)
+	@mkdir -p $(@D)
+	$(CC) $(C_FLAGS) -c $< -o $@
+$(BUILD)/fix_mpm_couple/%.o: src/fix_mpm_couple/%.c $(READY)
+	@mkdir -p $(@D)
+	$(MPICC) $(C_FLAGS) -c $< -o $@
+$(BUILD)/fix_mpm_couple/%.o: src/fix_mpm_couple/%.cpp $(READY)
+	@mkdir -p $(@D)
+	$(MPICXX) $(CXX_FLAGS) -c $< -o $@
+$(BUILD)/isa/%.o: $(KERNEL_SOURCE) $(READY)
+	@mkdir -p $(@D)
+	$(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -c $< -o $@
+$(BUILD)/%.cu.o: src/%.cu $(READY)
+	@mkdir -p $(@D)
+	$(NVCC) $(NVCC_FLAGS) -MMD -MP -MF $(BUILD)/$*.cu.d -c $< -o $@
+
+$(LIBRARY): $(C_OBJECTS) $(MPI_OBJECTS)
+	@rm -f $@
+	ar rcs $@ $^
+$(BUILD)/dempm: $(BUILD)/fix_mpm_couple/main.o $(LIBRARY)
+	$(MPICXX) $(SANITIZE) -fopenmp $^ $(ALL_LIBS) -o $@
+$(BUILD)/dempm-pack: $(BUILD)/cuda_rve/rve_pack_main.o $(LIBRARY)
+	$(CC) $(SANITIZE) -fopenmp $^ $(C_LIBS) -o $@
+
+# Tests named test_mpi_* need MPI, tests in C++ the VTK library; the others only plain C.
+$(BUILD)/tests/test_mpi_%: tests/unit/test_mpi_%.c $(LIBRARY)
+	@mkdir -p $(@D)
+	$(MPICC) $(C_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(C_LIBS) -o $@
+$(BUILD)/tests/%: tests/unit/%.c $(LIBRARY)
+	@mkdir -p $(@D)
+	$(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(C_LIBS) -o $@
+$(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
+	@mkdir -p $(@D)
+	$(MPICXX) $(CXX_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(ALL_LIBS) -o $@
+$(BUILD)/bench/%: tests/bench/%.c $(LIBRARY)
+	@mkdir -p $(@D)
+	$(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
+
+-include $(shell test -d $(BUILD) && find $(BUILD) -name '*.d')
+
+# ------------------------------------------------------------------------------------------------------------- running
+RUN_ENV = DEMPM_BUILD=$(abspath $(BUILD)) MPIRUN=$(MPIRUN) PYTHON=$(PYTHON)
+PYTEST = $(RUN_ENV) $(PYTHON) -m pytest -q -p no:cacheprovider
+
+test: programs $(TESTS)
+	$(PYTEST) tests
+test-unit: $(TESTS)
+	$(PYTEST) tests/test_unit.py
+test-scenes: programs
+	$(PYTEST) tests --ignore=tests/test_unit.py
+test-gpu: $(TESTS)
+	$(RUN_ENV) DEMPM_BACKEND=cuda $(PYTHON) -m pytest -q -p no:cacheprovider tests/test_unit.py
+sanitize:
+	$(MAKE) BUILD=$(BUILD)/sanitize OPT="-O1 -g -fno-omit-frame-pointer" NVCC= \
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-unit
+bench: programs $(BENCHES)
+	$(foreach b,$(BENCHES),$(b) cpu &&) true
+bench-gpu: programs $(BENCHES)
+	$(foreach b,$(BENCHES),$(b) cuda &&) true
+demo: programs
+	$(RUN_ENV) DEMPM=$(abspath $(BUILD)/dempm) DEMPM_PACK=$(abspath $(BUILD)/dempm-pack) examples/column_collapse/run
+
+check-cuda:
+ifeq ($(strip $(NVCC)),)
+	@echo "check-cuda: nvcc not found (PATH, /usr/local/cuda/bin): the CUDA sources are not compiled"
+else
+	@mkdir -p $(BUILD)/check-cuda
+	$(foreach f,$(CU_SOURCES),$(NVCC) $(NVCC_FLAGS) -Werror all-warnings -Xptxas -warn-spills -c $(f) \
+	  -o $(BUILD)/check-cuda/$(notdir $(f)).o &&) true
+	@echo "check-cuda: $(words $(CU_SOURCES)) file(s) for $(CUDA_ARCHS:%=sm_%)"
+endif
+
+install: programs
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/doc/dempm
+	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 README.md LICENSE CHANGELOG.md doc/*.md $(DESTDIR)$(PREFIX)/share/doc/dempm
+clean:
+	rm -rf $(BUILD)
+
+# ------------------------------------------------------------------------------------------------------------ packages
+PACKAGES = gcc g++ liggghts libliggghts-dev openmpi-bin libopenmpi-dev libvtk9-dev libcmocka-dev python3 python3-numpy \
+           python3-scipy python3-matplotlib python3-vtk9 python3-pytest
+deps: $(BUILD)/packages
+$(BUILD)/packages: Makefile
+	@mkdir -p $(@D)
+	@command -v dpkg-query >/dev/null || { echo "deps: no dpkg here; taking for granted: $(PACKAGES)"; touch $@; exit 0; }; \
+	missing=; for p in $(PACKAGES); do \
+	  case "$$(dpkg-query -W -f '$${db:Status-Abbrev}' $$p 2>/dev/null)" in ii*) ;; *) missing="$$missing $$p";; esac; done; \
+	if [ -n "$$missing" ]; then \
+	  if [ "$(DEPS)" = no ]; then echo "deps: DEPS=no, but these packages are missing:$$missing" >&2; exit 1; fi; \
+	  sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
+	  echo "deps: installing$$missing"; \
+	  get="$$sudo env DEBIAN_FRONTEND=noninteractive apt-get -y -q"; \
+	  { apt-cache show $$missing >/dev/null 2>&1 && $$get install --no-install-recommends $$missing; } || \
+	  { $$get update && $$get install --no-install-recommends $$missing; }; \
+	fi && touch $@
+
+help:
+	@echo "make              build/dempm and build/dempm-pack"
+	@echo "make demo         the collapse of a granular column; pictures in examples/column_collapse/out"
+	@echo "make test         unit tests and scenes (test-unit, test-scenes: one of them; test-gpu: on a GPU)"
+	@echo "make bench        timings of the RVE engine on the CPU (bench-gpu: on a GPU)"
+	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
+	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
+	@echo "make install PREFIX=/usr/local"
+	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"
+	@echo "make clean        removes build/"
+	@echo "Variables: OPT WERROR SANITIZE CFLAGS CXXFLAGS NVCC (NVCC= builds without CUDA) BUILD PYTHON MPIRUN"
+
+.PHONY: $(PHONY)
