@@ -30,8 +30,8 @@ C_FLAGS = -std=c17 $(WARN) -Wstrict-prototypes $(COMMON) $(CFLAGS)
 # installed them.
 VTK_INCLUDE = $(shell ls -d /usr/include/vtk-9* 2>/dev/null | head -1)
 VTK_SUFFIX = $(patsubst vtk-%,%,$(notdir $(VTK_INCLUDE)))
-CXX_FLAGS = -std=c++17 -Wall -Wextra -Wshadow $(WERROR) $(COMMON) -isystem /usr/include/liggghts \
-            -isystem $(VTK_INCLUDE) $(CXXFLAGS)
+CXX_FLAGS = -std=c++17 -Wall -Wextra -Wshadow $(WERROR) $(COMMON) -DOMPI_SKIP_MPICXX \
+            -isystem /usr/include/liggghts -isystem $(VTK_INCLUDE) $(CXXFLAGS)
 VTK_LIBS = $(patsubst %,-lvtk%-$(VTK_SUFFIX),IOXML IOXMLParser IOCore CommonExecutionModel CommonDataModel \
              CommonTransforms CommonMath CommonMisc CommonSystem CommonCore sys)
 CUDA_HOME = $(patsubst %/bin/nvcc,%,$(realpath $(NVCC)))
