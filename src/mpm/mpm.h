@@ -54,6 +54,7 @@ typedef struct MpmPoint {
   double affine[9];             /* APIC matrix: velocity near the point = v + affine (x - x_p), 1/s */
   double temperature;           /* incremental T_p (eq. 28) */
   double temperature_mapped;    /* remapped from the grid (eq. 29): what law and output see */
+  double temperature_law;       /* temperature_mapped that the law saw last: state, keep it with the point (exchange, restart) */
   double temperature_gradient[3]; /* K/m */
   double heat_capacity;         /* specific, J/(kg K); required if thermal */
   double heat;                  /* W/m3 from the law */
@@ -121,7 +122,8 @@ BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count);
 /* One step of dt seconds: P2G, grid, law, G2P in the scene's order. points [count] in and out, order kept. Collective.
  * BASE_ERROR_UNSTABLE names the first (lowest tag) point that is not finite. */
 BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt);
-/* Answers of the law for the initial state (stress of the packing, conductivity, modulus), without stepping. Collective. */
+/* Answers of the law for the initial state (stress of the packing, conductivity, modulus), without stepping. Sets temperature_mapped
+ * and temperature_law to temperature: call it once for new points, not for restarted ones. Collective. */
 BaseStatus mpm_initialise(Mpm *mpm, MpmPoint *points, int count);
 
 /* Critical time steps of this rank's points, s; INFINITY without points. Mechanical: h / (sqrt(M/rho) + |v|) times the limit of
