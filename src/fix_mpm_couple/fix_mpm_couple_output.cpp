@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* Global values for thermo_style, the progress line, the closing line. */
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "../base/tensor.h"
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "fix_mpm_couple.h"
+#include "fix_mpm_rve.h"
+#include "rank_error.h"
+#include "update.h"
+
+using namespace LAMMPS_NS;
+
+/* Collective, as thermo output is. */
+void FixMPMCouple::update_totals() {
+  if (totals_step_ == update->ntimestep) return;
+  gather();
+  MpmTotals sums;
+  mpm_totals(points_.data(), (int)points_.size(), &sums);
+  double mine[TOTALS] = {};
+  mine[TOTAL_MASS] = sums.mass;
+  for (int k = 0; k < 3; k++) mine[TOTAL_MOMENTUM + k] = sums.momentum[k];
+  mine[TOTAL_KINETIC] = sums.kinetic_energy;
+  mine[TOTAL_THERMAL] = sums.thermal_energy;
+  mine[TOTAL_POINTS] = (double)points_.size();
+  for (size_t n = 0; n < points_.size(); n++) {
+    const MpmPoint &point = points_[n];
+    const int i = particle_[n];
+    double position[3];
+    domain->unmap(atom->x[i], atom->image[i], position);
+    for (int k = 0; k < 3; k++) mine[TOTAL_POTENTIAL] -= point.force[k] * position[k];
+    mine[TOTAL_STORED] +=
+        point.volume0 * tensor_determinant(point.deformation_gradient) * point.scalars[MPM_LAW_ENERGY_DENSITY];
+    mine[TOTAL_EXTERNAL_WORK] += state_[i][STATE_EXTERNAL_WORK];
+  }
+  MPI_Allreduce(mine, totals_, TOTALS, MPI_DOUBLE, MPI_SUM, world);
+  if (rve_ && rve_->law()) {
+    RveLawTotals law;
+    fix_check(lmp, this, rve_law_totals(rve_->law(), &law));
+    totals_[TOTAL_FRICTION_HEAT] = law.friction_work;
+    totals_[TOTAL_RVES_RUN] = (double)law.rves_run;
+    totals_[TOTAL_UNBALANCED] = law.worst_unbalanced;
+    totals_[TOTAL_PARTICLE_STEPS] = (double)law.particle_steps;
+    totals_[TOTAL_DAMPING_WORK] = law.damping_work;
+  }
+  totals_step_ = update->ntimestep;
+}
+
+double FixMPMCouple::compute_scalar() {
+  update_totals();
+  return totals_[TOTAL_KINETIC] + totals_[TOTAL_POTENTIAL] + totals_[TOTAL_STORED];
+}
+
+double FixMPMCouple::compute_vector(int k) {
+  update_totals();
+  return totals_[k];
+}
+
+/* ---------------------------------------------------------------------------------------------------- how long it
+ * takes */
+
+void FixMPMCouple::start_progress() {
+  show_progress_ = comm->me == 0 && screen == stdout && isatty(STDOUT_FILENO);
+  run_started_ = progress_printed_ = base_seconds();
+  particle_steps_before_ = rve_seconds_before_ = 0.0;
+  if (!rve_) return;
+  RveLawTotals law;
+  fix_check(lmp, this, rve_law_totals(rve_->law(), &law));
+  particle_steps_before_ = (double)law.particle_steps;
+  rve_seconds_before_ = law.seconds;
+}
+
+/* On a terminal, once per second. Written over itself and wiped, so that LIGGGHTS' own lines stay readable. */
+void FixMPMCouple::progress() {
+  if (!show_progress_) return;
+  const double now = base_seconds();
+  if (now - progress_printed_ < 1.0) return;
+  progress_printed_ = now;
+  const double done = (double)(update->ntimestep - update->firststep),
+               left = (double)(update->laststep - update->ntimestep);
+  const double rate = done / (now - run_started_);
+  fprintf(screen, "\r\033[K  step %lld of %lld: %.3g steps/s, %.0f s left\r", (long long)update->ntimestep,
+          (long long)update->laststep, rate, left / rate);
+  fflush(screen);
+}
+
+void FixMPMCouple::post_run() {
+  if (show_progress_) fprintf(screen, "\r\033[K");
+  if (!rve_) return;
+  RveLawTotals law;
+  fix_check(lmp, this, rve_law_totals(rve_->law(), &law));
+  const double seconds = base_seconds() - run_started_, steps = (double)law.particle_steps - particle_steps_before_;
+  if (comm->me != 0 || steps <= 0.0) return;
+  const std::string line = format_text(
+      "Fix %s: %lld RVEs of %lld grains in all, %.4g DEM particle-steps, %.4g per second, %.0f %% of the time in "
+      "RVEs\n",
+      id, (long long)law.rves, (long long)law.grains, steps, steps / seconds,
+      100.0 * (law.seconds - rve_seconds_before_) / seconds);
+  if (screen) fputs(line.c_str(), screen);
+  if (logfile) fputs(line.c_str(), logfile);
+}

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* One step: particles to points, the MPM step, points to particles; and what keeps points from getting lost. */
+#include <cstring>
+
+#include "atom.h"
+#include "domain.h"
+#include "fix_mpm_couple.h"
+#include "fix_mpm_rve.h"
+#include "fix_mpm_wall.h"
+#include "output.h"
+#include "rank_error.h"
+#include "update.h"
+
+using namespace LAMMPS_NS;
+
+bool FixMPMCouple::is_point(int i) const { return atom->mask[i] & groupbit; }
+
+/* ---------------------------------------------------------------------------------------------------- new points */
+
+void FixMPMCouple::start_points() {
+  BaseStatus status = BASE_OK;
+  for (int i = 0; i < atom->nlocal && status == BASE_OK; i++) {
+    if (!is_point(i)) continue;
+    if (state_[i][STATE_STAGE] == STAGE_NEW) {
+      if (!rve_ && !(atom->density[i] > 0.0))
+        status =
+            base_error(BASE_ERROR_ARGUMENT, "material point %d has density %g; set it by: set group GROUP density RHO",
+                       atom->tag[i], atom->density[i]);
+      else start_point(i);
+    }
+    /* `set ... diameter` or `density` on points that have started would change rmass, which is the mass of the point.
+     */
+    MpmPoint point;
+    memcpy(&point, state_[i], sizeof point);
+    atom->rmass[i] = point.mass;
+  }
+  fix_check(lmp, this, status);
+}
+
+void FixMPMCouple::start_point(int i) {
+  MpmPoint point;
+  mpm_point_default(&point);
+  if (rve_) atom->density[i] = bulk_density_;
+  point.tag = atom->tag[i];
+  memcpy(point.size0, size0_, sizeof size0_);
+  point.volume0 = size0_[0] * size0_[1] * size0_[2];
+  point.mass = atom->density[i] * point.volume0;
+  point.heat_capacity = heat_capacity_;
+  point.temperature = point.temperature_mapped = start_temperature_;
+  memcpy(state_[i], &point, sizeof point);
+  state_[i][STATE_EXTERNAL_WORK] = 0.0;
+  state_[i][STATE_STAGE] = STAGE_STARTED;
+}
+
+void FixMPMCouple::assign_rves() {
+  if (!rve_) return;
+  std::vector<int64_t> tags;
+  for (const MpmPoint &point : points_) tags.push_back(point.tag);
+  rve_->assign(tags);
+}
+
+/* Volumes of new points, by which the law weighs its sums. */
+void FixMPMCouple::tell_volumes() {
+  if (!rve_) return;
+  std::vector<int64_t> tags;
+  std::vector<double> volumes;
+  for (size_t k = 0; k < points_.size(); k++) {
+    if (state_[particle_[k]][STATE_STAGE] == STAGE_ANSWERED) continue;
+    tags.push_back(points_[k].tag);
+    volumes.push_back(points_[k].volume0);
+  }
+  fix_check(lmp, this, rve_law_set_volumes(rve_->law(), (int)tags.size(), tags.data(), volumes.data()));
+}
+
+/* Stress, conductivity and modulus of points that have not met the law yet. Collective. */
+void FixMPMCouple::answer_points() {
+  int mine = 0, any;
+  for (int i : particle_)
+    if (state_[i][STATE_STAGE] != STAGE_ANSWERED) mine = 1;
+  MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
+  if (!any) return;
+  std::vector<MpmPoint> answered = points_;
+  fix_check(lmp, this, mpm_initialise(mpm_, answered.data(), (int)answered.size()));
+  tell_volumes();
+  for (size_t k = 0; k < points_.size(); k++) {
+    double *state = state_[particle_[k]];
+    if (state[STATE_STAGE] == STAGE_ANSWERED) continue;
+    points_[k] = answered[k];
+    memcpy(state, &points_[k], sizeof(MpmPoint));
+    state[STATE_STAGE] = STAGE_ANSWERED;
+  }
+}
+
+/* ---------------------------------------------------------------------------------------------------- one step */
+
+void FixMPMCouple::gather() {
+  points_.clear();
+  particle_.clear();
+  for (int i = 0; i < atom->nlocal; i++) {
+    if (!is_point(i)) continue;
+    MpmPoint point;
+    memcpy(&point, state_[i], sizeof point);
+    point.tag = atom->tag[i];
+    point.heat_capacity = heat_capacity_;
+    point.heat_external = 0.0;
+    for (int k = 0; k < 3; k++) {
+      point.position[k] = atom->x[i][k];
+      point.velocity[k] = atom->v[i][k];
+      point.force[k] = k < scene_.dimension ? atom->f[i][k] : 0.0;
+    }
+    points_.push_back(point);
+    particle_.push_back(i);
+  }
+}
+
+void FixMPMCouple::scatter() {
+  for (size_t n = 0; n < points_.size(); n++) {
+    const MpmPoint &point = points_[n];
+    const int i = particle_[n];
+    memcpy(state_[i], &point, sizeof point);
+    for (int k = 0; k < scene_.dimension; k++) {
+      state_[i][STATE_EXTERNAL_WORK] += point.force[k] * (point.position[k] - atom->x[i][k]);
+      atom->x[i][k] = point.position[k];
+      atom->v[i][k] = point.velocity[k];
+    }
+    /* At once, not when LIGGGHTS happens to reneighbour: the way must not depend on that. */
+    domain->remap(atom->x[i], atom->image[i]);
+  }
+}
+
+void FixMPMCouple::final_integrate() {
+  gather();
+  for (size_t k = 0; k < walls_.size(); k++) walls_[k] = wall_fixes_[k]->present();
+  fix_check(lmp, this, mpm_step(mpm_, points_.data(), (int)points_.size(), update->dt));
+  scatter();
+  for (size_t k = 0; k < walls_.size(); k++) wall_fixes_[k]->end_step(walls_[k], update->dt);
+  check_leaving(atom->x);
+  check_time_step(false);
+  fill_output();
+  progress();
+  /* Points have moved after LIGGGHTS fitted a shrink-wrapped box around them: a restart file needs a box that holds
+   * them. */
+  if (domain->nonperiodic == 2 && output->restart_requested(update->ntimestep)) domain->reset_box();
+}
+
+void FixMPMCouple::fill_output() {
+  for (size_t k = 0; k < points_.size(); k++) point_output(points_[k], scene_.dimension, array_atom[particle_[k]]);
+}
+
+/* ---------------------------------------------------------------------------------------------------- nothing lost */
+
+/* Beyond a fixed boundary, where LIGGGHTS drops particles silently. */
+bool FixMPMCouple::is_outside(const double position[3]) const {
+  for (int k = 0; k < 3; k++) {
+    if (domain->boundary[k][0] == 1 && position[k] < domain->boxlo[k]) return true;
+    if (domain->boundary[k][1] == 1 && position[k] >= domain->boxhi[k]) return true;
+  }
+  return false;
+}
+
+void FixMPMCouple::check_leaving(double **x) const {
+  if (delete_leaving_) return;
+  BaseStatus status = BASE_OK;
+  for (int i : particle_)
+    if (status == BASE_OK && is_outside(x[i]))
+      status = base_error(BASE_ERROR_UNSTABLE,
+                          "material point %d left the box at step %lld through a fixed boundary, at (%g, %g, %g): add "
+                          "a fix mpm/wall, make the box "
+                          "larger, or let points go by 'leaving delete'",
+                          atom->tag[i], (long long)update->ntimestep, x[i][0], x[i][1], x[i][2]);
+  fix_check(lmp, this, status);
+}
+
+bigint FixMPMCouple::count_points(bool inside_only) const {
+  bigint mine = 0, all;
+  for (int i = 0; i < atom->nlocal; i++) mine += is_point(i) && !(inside_only && is_outside(atom->x[i]));
+  MPI_Allreduce(&mine, &all, 1, MPI_LMP_BIGINT, MPI_SUM, world);
+  return all;
+}
+
+void FixMPMCouple::pre_exchange() { points_before_exchange_ = count_points(true); }
+
+/* After LIGGGHTS moved particles between ranks, which drops those that are no neighbour's. Particles inserted by
+ * another fix join here. */
+void FixMPMCouple::pre_neighbor() {
+  const bigint now = count_points(false), expected = points_before_exchange_;
+  if (expected >= 0 && now < expected)
+    fix_failed(lmp, this,
+               format_text("%lld material point(s) were lost between processors: they moved further than a processor's "
+                           "sub-domain since the "
+                           "last reneighbouring; use 'neigh_modify every 1 delay 0 check yes' or a smaller timestep",
+                           (long long)(expected - now)));
+  if (update->setupflag || !mpm_) return;
+  start_points();
+  gather();
+  answer_points();
+}

@@ -1,0 +1,236 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "fix_mpm_rve.h"
+
+#include <climits>
+#include <cmath>
+#include <cstring>
+
+#include "../cuda_rve/rve_packing.h"
+#include "comm.h"
+#include "domain.h"
+#include "keyword_parser.h"
+#include "material_properties.h"
+#include "rank_error.h"
+
+using namespace LAMMPS_NS;
+
+/* In front of the state in a restart file. */
+struct RestartHeader {
+  char magic[8];
+  int64_t size; /* bytes of state that follow */
+  int32_t install_pending, rest_pending;
+};
+static const char RESTART_MAGIC[8] = {'m', 'p', 'm', '/', 'r', 'v', 'e', '1'};
+
+static const std::vector<std::string> DAMPINGS = {"none", "local", "viscous"};
+
+FixMPMRve::FixMPMRve(LAMMPS *lammps, int narg, char **arg)
+    : Fix(lammps, narg, arg),
+      scene_(rve_scene_default()),
+      tangential_(true),
+      backend_(RVE_BACKEND_AUTO),
+      law_(NULL),
+      assigned_(false),
+      install_pending_(false),
+      rest_pending_(false) {
+  restart_global = 1;
+  scene_.dimension = domain->dimension;
+  read_keywords(narg, arg);
+}
+
+FixMPMRve::~FixMPMRve() {
+  rve_law_destroy(law_);
+  for (RvePacking &packing : packings_) rve_packing_destroy(&packing);
+}
+
+void FixMPMRve::read_keywords(int narg, char **arg) {
+  KeywordParser parser(lmp, this, narg, arg, 3,
+                       {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
+                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "backend", "threads"});
+  std::vector<std::string> files;
+  while (parser.next()) {
+    if (parser.is("packing")) {
+      do files.push_back(parser.word("the name of a file with a periodic packing"));
+      while (parser.has_value());
+    } else if (parser.is("model")) parser.choice({"hooke/stiffness"});
+    else if (parser.is("tangential")) tangential_ = parser.choice({"off", "history"}) == 1;
+    else if (parser.is("density")) scene_.density = parser.number(NumberRange::positive());
+    else if (parser.is("grain")) scene_.grain = parser.choice({"disk", "sphere"}) == 0 ? RVE_DISK : RVE_SPHERE;
+    else if (parser.is("thickness")) scene_.thickness = parser.number(NumberRange::positive());
+    else if (parser.is("damping")) read_damping(parser);
+    else if (parser.is("pipe_resistance")) scene_.pipe_resistance = parser.number(NumberRange::positive());
+    else if (parser.is("reference")) scene_.reference_temperature = parser.number(NumberRange::any());
+    else if (parser.is("bonds")) read_bonds(parser);
+    else if (parser.is("substeps")) scene_.substeps = parser.integer(0, 100000000);
+    else if (parser.is("timestep/dem")) scene_.time_step = parser.number(NumberRange::positive());
+    else if (parser.is("skin")) scene_.skin = parser.number(NumberRange::positive());
+    else if (parser.is("rotation")) scene_.rotation = parser.yes_no();
+    else if (parser.is("backend"))
+      backend_ =
+          (RveBackend[]){RVE_BACKEND_AUTO, RVE_BACKEND_CPU, RVE_BACKEND_CUDA}[parser.choice({"auto", "cpu", "cuda"})];
+    else if (parser.is("threads")) scene_.threads = parser.integer(0, 4096);
+  }
+  check_keywords(parser);
+  read_packings(files);
+}
+
+void FixMPMRve::check_keywords(const KeywordParser &parser) {
+  parser.require("packing", "packing FILE [FILE2 ...]");
+  parser.require("model", "model hooke/stiffness");
+  parser.require("tangential", "tangential history|off");
+  parser.require("density", "density RHO, that of the grains' matter, kg/m3");
+  if (scene_.dimension == 2) {
+    parser.require("grain", "grain disk|sphere (disks fill the thickness, spheres lie in one layer)");
+    parser.require("thickness", "thickness Z, the depth that volume and mass of a 2D packing count for, m");
+  } else {
+    if (parser.given("grain") && scene_.grain == RVE_DISK)
+      parser.fail("keyword 'grain': 'disk' is given, allowed is sphere in 3D");
+    if (parser.given("thickness")) parser.fail("keyword 'thickness' is for 2D only");
+    scene_.grain = RVE_SPHERE;
+  }
+}
+
+void FixMPMRve::read_damping(KeywordParser &parser) {
+  scene_.local_damping = scene_.critical_damping = 0.0;
+  const int kind = parser.choice(DAMPINGS);
+  if (kind == 1) scene_.local_damping = parser.number(NumberRange::from_below(0.0, 1.0));
+  if (kind == 2) scene_.critical_damping = parser.number(NumberRange::from_below(0.0, 1.0));
+}
+
+void FixMPMRve::read_bonds(KeywordParser &parser) {
+  scene_.bonds = 1;
+  if (!parser.accept("strength"))
+    parser.refuse(parser.has_value() ? parser.word("") : "", "strength B shear_ratio M melting TS|none");
+  scene_.bond_strength = parser.number(NumberRange::positive());
+  if (!parser.accept("shear_ratio"))
+    parser.refuse(parser.has_value() ? parser.word("") : "", "shear_ratio M after strength B");
+  scene_.bond_shear_ratio = parser.number(NumberRange::positive());
+  if (!parser.accept("melting"))
+    parser.refuse(parser.has_value() ? parser.word("") : "", "melting TS|none after shear_ratio M");
+  scene_.bond_melting_temperature = parser.accept("none") ? HUGE_VAL : parser.number(NumberRange::any());
+}
+
+void FixMPMRve::read_packings(const std::vector<std::string> &files) {
+  packings_.resize(files.size());
+  memset(packings_.data(), 0, files.size() * sizeof(RvePacking));
+  for (size_t k = 0; k < files.size(); k++) {
+    BaseStatus status = rve_packing_read(files[k].c_str(), scene_.dimension, &packings_[k]);
+    if (status == BASE_OK) status = rve_packing_check(&packings_[k]);
+    if (status != BASE_OK) base_error_context(status, "keyword 'packing', file %s: ", files[k].c_str());
+    fix_check(lmp, this, status);
+  }
+}
+
+void FixMPMRve::read_properties(RveScene &scene, int type, bool thermal) const {
+  const MaterialProperties properties(lmp, this, type);
+  scene.normal_stiffness = properties.of_pair("kn", NumberRange::positive());
+  scene.tangential_stiffness = tangential_ ? properties.of_pair("kt", NumberRange::at_least(0.0)) : 0.0;
+  scene.friction = tangential_ ? properties.of_pair("coefficientFriction", NumberRange::at_least(0.0)) : 0.0;
+  scene.normal_viscosity = properties.has("gamman") ? properties.of_pair("gamman", NumberRange::at_least(0.0)) : 0.0;
+  scene.tangential_viscosity =
+      tangential_ && properties.has("gammat") ? properties.of_pair("gammat", NumberRange::at_least(0.0)) : 0.0;
+  scene.thermal = thermal;
+  if (!thermal) {
+    if (scene.bonds && !std::isinf(scene.bond_melting_temperature))
+      fix_failed(lmp, this, "keyword 'bonds': melting bonds need 'thermal yes' in fix mpm/couple, or 'melting none'");
+    return;
+  }
+  scene.expansion = properties.of_type("thermalExpansionCoefficient", NumberRange::at_least(0.0));
+  if (std::isnan(scene.pipe_resistance))
+    fix_failed(
+        lmp, this,
+        "keyword 'pipe_resistance' is missing: with 'thermal yes' in fix mpm/couple the resistance of the grains' "
+        "heat pipes per length, K/(W m), is needed");
+  if (std::isnan(scene.reference_temperature))
+    fix_failed(lmp, this,
+               "keyword 'reference' is missing: with 'thermal yes' in fix mpm/couple the temperature at which the "
+               "radii of the "
+               "packing hold is needed");
+}
+
+void FixMPMRve::prepare(const char *user, int type, bool thermal) {
+  if (!user_.empty() && user_ != user)
+    fix_failed(lmp, this, "serves fix " + user_ + " already; fix " + user + " needs a fix mpm/rve of its own");
+  user_ = user;
+  RveScene scene = scene_;
+  read_properties(scene, type, thermal);
+  fix_check(lmp, this, rve_scene_check(&scene));
+  if (law_) {
+    fix_check(lmp, this, rve_law_set_scene(law_, &scene));
+    return;
+  }
+  fix_check(lmp, this, rve_law_create(world, &scene, packings_.data(), (int)packings_.size(), backend_, &law_));
+  if (!restart_state_.empty()) {
+    fix_check(lmp, this, rve_law_unpack(law_, restart_state_.data(), restart_state_.size()));
+    restart_state_.clear();
+    restart_state_.shrink_to_fit();
+    assigned_ = true;
+  }
+}
+
+void FixMPMRve::assign(const std::vector<int64_t> &tags) {
+  fix_check(lmp, this, rve_law_assign(law_, (int)tags.size(), tags.data()));
+  assigned_ = true;
+  carry_out_pending();
+}
+
+void FixMPMRve::carry_out_pending() {
+  if (!assigned_) return;
+  if (install_pending_) fix_check(lmp, this, rve_law_install_bonds(law_));
+  if (rest_pending_) fix_check(lmp, this, rve_law_rest(law_));
+  install_pending_ = rest_pending_ = false;
+}
+
+/* LIGGGHTS passes the rest of the line and wants to know how many words were used: all, as the parser refuses others.
+ */
+int FixMPMRve::modify_param(int narg, char **arg) {
+  KeywordParser parser(lmp, this, narg, arg, 0, {"bonds", "rest", "damping"});
+  while (parser.next()) {
+    if (parser.is("bonds")) {
+      parser.choice({"install"});
+      if (!scene_.bonds)
+        parser.fail(
+            "keyword 'bonds': the fix was defined without bonds; add 'bonds strength B shear_ratio M melting TS|none'");
+      install_pending_ = true;
+    } else if (parser.is("rest")) rest_pending_ = true;
+    else if (parser.is("damping")) read_damping(parser); /* taken over by the next run's init */
+  }
+  carry_out_pending();
+  return narg;
+}
+
+/* Collective, though only rank 0 writes. */
+void FixMPMRve::write_restart(FILE *file) {
+  void *bytes = NULL;
+  size_t size = 0;
+  if (law_) fix_check(lmp, this, rve_law_pack(law_, &bytes, &size));
+  else if (comm->me == 0) size = restart_state_.size();
+  BaseStatus status = BASE_OK;
+  if (size + sizeof(RestartHeader) > INT_MAX)
+    status = base_error(
+        BASE_ERROR_MEMORY,
+        "the RVEs' state of %zu bytes does not fit into a LIGGGHTS restart file, which allows %d bytes per fix", size,
+        INT_MAX);
+  fix_check(lmp, this, status);
+  if (comm->me == 0) {
+    RestartHeader header = {{}, (int64_t)size, install_pending_, rest_pending_};
+    memcpy(header.magic, RESTART_MAGIC, sizeof header.magic);
+    const int total = (int)(size + sizeof header);
+    fwrite(&total, sizeof total, 1, file);
+    fwrite(&header, sizeof header, 1, file);
+    fwrite(law_ ? bytes : restart_state_.data(), 1, size, file);
+  }
+  base_free(bytes);
+}
+
+void FixMPMRve::restart(char *bytes) {
+  RestartHeader header;
+  memcpy(&header, bytes, sizeof header);
+  if (memcmp(header.magic, RESTART_MAGIC, sizeof header.magic) != 0 || header.size < 0 || header.size > INT_MAX)
+    fix_failed(lmp, this, "the restart file holds no state of this fix, or one of another version");
+  restart_state_.assign(bytes + sizeof header, bytes + sizeof header + header.size);
+  install_pending_ = header.install_pending;
+  rest_pending_ = header.rest_pending;
+}
+
+double FixMPMRve::memory_usage() { return (double)restart_state_.size(); }
