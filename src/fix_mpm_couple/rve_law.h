@@ -62,7 +62,7 @@ BaseStatus rve_law_set_scene(RveLaw *law, const RveScene *scene);
 /* Of all RVEs present; RVEs that are created later have none. */
 BaseStatus rve_law_install_bonds(RveLaw *law);
 BaseStatus rve_law_rest(RveLaw *law);
-double rve_law_bulk_density(const RveLaw *law);      /* mean over packings: mass of grains / cell volume, kg/m3; local */
+double rve_law_bulk_density(const RveLaw *law);      /* mean of packings: mass of grains / cell volume, kg/m3; local */
 int rve_law_threads(const RveLaw *law);              /* OpenMP threads of this rank; 0 = OpenMP's own choice; local */
 const char *rve_law_backend_name(const RveLaw *law); /* of this rank's RVEs, "" if it has none; local */
 

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* The RveLaw as its own two source files see it. */
+#ifndef DEMPM_RVE_LAW_PRIVATE_H
+#define DEMPM_RVE_LAW_PRIVATE_H
+
+#include "rve_farm.h"
+#include "rve_law.h"
+#include "rve_store.h"
+
+struct RveLaw {
+  MPI_Comm comm; /* own duplicate */
+  int rank, ranks;
+  int node_threads; /* this rank's share of its node's cores */
+  RveBackend backend;
+  RveFarm *farm;
+  RveStore *store;
+  int rves_run; /* on this rank, in the last step */
+  double worst_unbalanced;
+  /* Room for the plan in force. */
+  int point_room, request_room;
+  double *point_value;     /* [point_room][RVE_FARM_WIDTH] */
+  RveInput *request_input; /* [request_room] */
+  double *request_value;   /* [request_room][RVE_FARM_WIDTH] */
+};
+
+/* Creates the RVEs of tags that `farm` gave to this rank and `store` has not. Collective. */
+BaseStatus rve_law_create_missing(MPI_Comm comm, RveFarm *farm, RveStore *store);
+
+#endif
