@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
+/* clang-format off: the style's name is made a string as it stands */
 #ifdef FIX_CLASS
 
-FixStyle(mpm / vtk, FixMPMVtk)
+FixStyle(mpm/vtk,FixMPMVtk)
 
+/* clang-format on */
 #else
 
 #ifndef LMP_FIX_MPM_VTK_H
