@@ -119,8 +119,8 @@ static BaseStatus truth_step(Truth *truth, const int *alive, int step, double dt
 /* -- the law under test ---------------------------------------------------------------------------------------- */
 
 /* One update of the law over comm. Point `tag` is on a rank that changes with every step, points come in an order
- * that changes too. answers [TAGS][ANSWER] on all ranks, rows of points that are not alive untouched. `spoil` (or
- * 0): a tag with a velocity gradient that is not finite. */
+ * that changes too. answers [TAGS][ANSWER] on all ranks, rows of points that are not alive untouched. spoil > 0: tags
+ * from `spoil` on have a velocity gradient that is not finite. */
 static BaseStatus law_step(RveLaw *law, MPI_Comm comm, const int *alive, int step, double dt, int64_t spoil,
                            double *answers) {
   int64_t tag[TAGS];
@@ -136,7 +136,7 @@ static BaseStatus law_step(RveLaw *law, MPI_Comm comm, const int *alive, int ste
     RveInput input;
     if (!alive[t] || (int)(base_random(&state) * ranks) != rank) continue;
     make_input(t + 1, step, &input);
-    if (t + 1 == spoil) input.velocity_gradient[1] = NAN;
+    if (spoil && t + 1 >= spoil) input.velocity_gradient[1] = NAN;
     tag[n] = t + 1;
     temperature[n] = input.temperature;
     memcpy(gradient + 9 * n++, input.velocity_gradient, sizeof input.velocity_gradient);
@@ -264,7 +264,9 @@ static BaseStatus run_law(MPI_Comm comm, int steps, RveLaw **law, double *answer
   MPI_Comm_rank(comm, &rank);
   TRY(rve_law_create(comm, &scene, packing, PACKINGS, RVE_BACKEND_CPU, law));
   for (int k = 0; k < TAGS; k++) tag[k] = k + 1, volume[k] = 1e-4 * (k + 1);
-  TRY(rve_law_assign(*law, rank == 0 ? TAGS : 0, tag)); /* all points on one rank */
+  /* All points on one rank. In two portions, so that ranks hold tags of both and not one range of tags each. */
+  TRY(rve_law_assign(*law, rank == 0 ? TAGS / 2 : 0, tag + TAGS - TAGS / 2));
+  TRY(rve_law_assign(*law, rank == 0 ? TAGS : 0, tag));
   TRY(rve_law_set_volumes(*law, rank == 0 ? TAGS : 0, tag, volume));
   for (int step = 0; step < steps; step++) TRY(law_step(*law, comm, alive, step, time_step, 0, answers));
   return BASE_OK;
