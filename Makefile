@@ -21,7 +21,8 @@ PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize c
          FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
-WARN = -Wall -Wextra -Wpedantic -Wshadow -Wvla $(WERROR)
+# psabi: vector types are passed between static functions only.
+WARN = -Wall -Wextra -Wpedantic -Wshadow -Wvla -Wno-psabi $(WERROR)
 # No errno and no traps from arithmetic, no contraction: vector and scalar loops then give the same bits.
 NUMERIC = -fno-math-errno -fno-trapping-math -ffp-contract=off
 COMMON = $(OPT) $(NUMERIC) -fPIC -fopenmp -MMD -MP $(SANITIZE) $(if $(CU_SOURCES),-DDEMPM_CUDA)
@@ -49,12 +50,12 @@ C_SOURCES := $(filter-out %_main.c %/rve_backend_cpu.c,$(wildcard src/base/*.c s
 MPI_SOURCES := $(wildcard src/fix_mpm_couple/*.c)
 CXX_SOURCES := $(filter-out %/main.cpp,$(wildcard src/fix_mpm_couple/*.cpp))
 CU_SOURCES := $(if $(NVCC),$(wildcard src/cuda_rve/*.cu))
-# The RVE kernels once per instruction set, chosen at run time.
+# The RVE kernels once per instruction set, chosen at run time. All lanes run the same code: contraction is safe there.
 KERNEL_SOURCE := $(wildcard src/cuda_rve/rve_backend_cpu.c)
 ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512)
-ISA_plain =
-ISA_avx2 = -mavx2
-ISA_avx512 = -mavx512f -mavx512dq -mavx512vl -mavx512bw -mprefer-vector-width=512
+ISA_plain = -ffp-contract=fast
+ISA_avx2 = -ffp-contract=fast -mavx2 -mfma
+ISA_avx512 = -ffp-contract=fast -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512
 KERNEL_OBJECTS := $(if $(KERNEL_SOURCE),$(ISAS:%=$(BUILD)/isa/%.o))
 
 LIBRARY := $(BUILD)/libdempm.a
@@ -67,6 +68,8 @@ TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
 
 # ------------------------------------------------------------------------------------------------------- compile, link
+# One short line per file; V=1 shows the commands.
+SHOW = $(if $(V),,@echo "  $(@:$(BUILD)/%=%)";)
 all: programs
 programs: $(PROGRAMS) $(LIBRARY)
 
@@ -78,41 +81,41 @@ $(BUILD)/flags: FORCE | $(BUILD)/packages
 
 $(BUILD)/%.o: src/%.c $(READY)
 	@mkdir -p $(@D)
-	$(CC) $(C_FLAGS) -c $< -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -c $< -o $@
 $(BUILD)/fix_mpm_couple/%.o: src/fix_mpm_couple/%.c $(READY)
 	@mkdir -p $(@D)
-	$(MPICC) $(C_FLAGS) -c $< -o $@
+	$(SHOW) $(MPICC) $(C_FLAGS) -c $< -o $@
 $(BUILD)/fix_mpm_couple/%.o: src/fix_mpm_couple/%.cpp $(READY)
 	@mkdir -p $(@D)
-	$(MPICXX) $(CXX_FLAGS) -c $< -o $@
+	$(SHOW) $(MPICXX) $(CXX_FLAGS) -c $< -o $@
 $(BUILD)/isa/%.o: $(KERNEL_SOURCE) $(READY)
 	@mkdir -p $(@D)
-	$(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -c $< -o $@
+	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -c $< -o $@
 $(BUILD)/%.cu.o: src/%.cu $(READY)
 	@mkdir -p $(@D)
-	$(NVCC) $(NVCC_FLAGS) -MMD -MP -MF $(BUILD)/$*.cu.d -c $< -o $@
+	$(SHOW) $(NVCC) $(NVCC_FLAGS) -MMD -MP -MF $(BUILD)/$*.cu.d -c $< -o $@
 
 $(LIBRARY): $(C_OBJECTS) $(MPI_OBJECTS)
 	@rm -f $@
-	ar rcs $@ $^
+	$(SHOW) ar rcs $@ $^
 $(BUILD)/dempm: $(BUILD)/fix_mpm_couple/main.o $(LIBRARY)
-	$(MPICXX) $(SANITIZE) -fopenmp $^ $(ALL_LIBS) -o $@
+	$(SHOW) $(MPICXX) $(SANITIZE) -fopenmp $^ $(ALL_LIBS) -o $@
 $(BUILD)/dempm-pack: $(BUILD)/cuda_rve/rve_pack_main.o $(LIBRARY)
-	$(CC) $(SANITIZE) -fopenmp $^ $(C_LIBS) -o $@
+	$(SHOW) $(CC) $(SANITIZE) -fopenmp $^ $(C_LIBS) -o $@
 
 # Tests named test_mpi_* need MPI, tests in C++ the VTK library; the others only plain C.
 $(BUILD)/tests/test_mpi_%: tests/unit/test_mpi_%.c $(LIBRARY)
 	@mkdir -p $(@D)
-	$(MPICC) $(C_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(C_LIBS) -o $@
+	$(SHOW) $(MPICC) $(C_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(C_LIBS) -o $@
 $(BUILD)/tests/%: tests/unit/%.c $(LIBRARY)
 	@mkdir -p $(@D)
-	$(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(C_LIBS) -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(C_LIBS) -o $@
 $(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
 	@mkdir -p $(@D)
-	$(MPICXX) $(CXX_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(ALL_LIBS) -o $@
+	$(SHOW) $(MPICXX) $(CXX_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(ALL_LIBS) -o $@
 $(BUILD)/bench/%: tests/bench/%.c $(LIBRARY)
 	@mkdir -p $(@D)
-	$(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
 
 -include $(shell test -d $(BUILD) && find $(BUILD) -name '*.d')
 
@@ -183,6 +186,6 @@ help:
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"
 	@echo "make clean        removes build/"
-	@echo "Variables: OPT WERROR SANITIZE CFLAGS CXXFLAGS NVCC (NVCC= builds without CUDA) BUILD PYTHON MPIRUN"
+	@echo "Variables: V=1 OPT WERROR SANITIZE CFLAGS CXXFLAGS NVCC (NVCC= builds without CUDA) BUILD PYTHON MPIRUN"
 
 .PHONY: $(PHONY)
