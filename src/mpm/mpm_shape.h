@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* Shape functions of one axis; products of axes give those of a node. `shape` and `dimension` are constants at every call site, and
+ * the functions are always inlined: each combination is compiled by itself, from one source.
+ *
+ * Lengths are in units of the spacing h: u = (x - origin) / h. The support of a point starts at node `base` and has mpm_shape_width()
+ * nodes per axis; f = u - base. */
+#ifndef DEMPM_MPM_SHAPE_H
+#define DEMPM_MPM_SHAPE_H
+
+#include "mpm.h"
+
+#define MPM_INLINE static inline __attribute__((always_inline))
+
+enum { MPM_WIDTH_MAX = 3 };
+
+MPM_INLINE int mpm_shape_width(MpmShape shape) { return shape == MPM_SHAPE_LINEAR ? 2 : 3; }
+
+/* base = floor(anchor). half: half the edge of the point's domain over h, uGIMP only. */
+MPM_INLINE double mpm_shape_anchor(MpmShape shape, double u, double half) {
+  return shape == MPM_SHAPE_LINEAR ? u : shape == MPM_SHAPE_BSPLINE ? u - 0.5 : u - half;
+}
+
+/* value[a] = S at node base + a, slope[a] = dS/du. uGIMP: mean of the hat function over [f - half, f + half], half <= 1/2
+ * (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity. */
+MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double value[MPM_WIDTH_MAX],
+                               double slope[MPM_WIDTH_MAX]) {
+  if (shape == MPM_SHAPE_LINEAR) {
+    value[0] = 1.0 - f, value[1] = f;
+    slope[0] = -1.0, slope[1] = 1.0;
+  } else if (shape == MPM_SHAPE_BSPLINE) {
+    const double left = 1.5 - f, right = f - 0.5;
+    value[0] = 0.5 * left * left, value[2] = 0.5 * right * right;
+    slope[0] = -left, slope[2] = right;
+    value[1] = 1.0 - value[0] - value[2];
+    slope[1] = left - right;
+  } else {
+    const double left = 1.0 - (f - half);                                   /* from the domain's left end to node 1 */
+    const double rest = left - 2.0 * half > 0.0 ? left - 2.0 * half : 0.0;  /* of it not covered by the domain */
+    const double right = 2.0 * half - left > 0.0 ? 2.0 * half - left : 0.0; /* of the domain beyond node 1 */
+    const double inverse = 0.5 / half;
+    value[0] = 0.5 * inverse * (left - rest) * (left + rest), value[2] = 0.5 * inverse * right * right;
+    slope[0] = -inverse * (left - rest), slope[2] = inverse * right;
+    value[1] = 1.0 - value[0] - value[2];
+    slope[1] = -slope[0] - slope[2];
+  }
+}
+
+/* APIC: row[a] such that sum_a row[a] v_a is the slope of v over u around the point: S_a d_a / D with d_a = base + a - u and
+ * D = sum S d^2. Linear: the same as dS/du, also where D vanishes. B-spline: D = 1/4. */
+MPM_INLINE void mpm_shape_affine(MpmShape shape, double f, const double value[MPM_WIDTH_MAX],
+                                 const double slope[MPM_WIDTH_MAX], double row[MPM_WIDTH_MAX]) {
+  if (shape == MPM_SHAPE_LINEAR) {
+    row[0] = slope[0], row[1] = slope[1];
+    return;
+  }
+  double moment = 0.0;
+  for (int a = 0; a < MPM_WIDTH_MAX; a++) row[a] = value[a] * (a - f), moment += row[a] * (a - f);
+  for (int a = 0; a < MPM_WIDTH_MAX; a++) row[a] /= moment;
+}
+
+#endif
