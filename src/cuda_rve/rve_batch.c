@@ -1,0 +1,432 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* Batches of RVEs: creation, stepping over threads or on the device, restart, views. */
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "rve_backend.h"
+#include "rve_outcome.h"
+
+typedef struct Workspace { /* one thread's */
+  void *memory;
+  size_t bytes;
+} Workspace;
+
+struct RveBatch {
+  RveScene scene;
+  RveFeatures features;
+  const RveKernels *kernels;
+  RveDevice *device; /* NULL on the CPU */
+  int count;
+  RveRecord *record;
+  int threads;
+  Workspace *workspace;
+  RveDeviceJob *job; /* [count] on a device */
+  char name[16];
+};
+
+/* ----------------------------------------------------------------------------------------------------- which kernels */
+
+static const RveKernels *choose_kernels(void) {
+  const RveKernels *best = &rve_kernels_plain;
+#if defined(__x86_64__)
+  const char *wanted = getenv("DEMPM_ISA");
+  const int has2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  const int has512 = has2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                     __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
+  if (has2) best = &rve_kernels_avx2;
+  if (has512) best = &rve_kernels_avx512;
+  if (wanted && strcmp(wanted, "plain") == 0) best = &rve_kernels_plain;
+  if (wanted && strcmp(wanted, "avx2") == 0 && has2) best = &rve_kernels_avx2;
+#endif
+  return best;
+}
+
+/* ---------------------------------------------------------------------------------------------------------- one record */
+
+static BaseStatus reserve(Workspace *workspace, const RveCounts *counts, int pairs, RveScratch *scratch) {
+  const size_t bytes = rve_scratch_layout(counts, pairs, NULL, scratch);
+  if (bytes > workspace->bytes) {
+    base_free(workspace->memory);
+    workspace->memory = NULL, workspace->bytes = 0;
+    TRY(base_alloc(bytes, 1, &workspace->memory));
+    workspace->bytes = bytes;
+  }
+  rve_scratch_layout(counts, pairs, workspace->memory, scratch);
+  return BASE_OK;
+}
+
+static int pairs_for(const RveRecord *record) {
+  const int slots = record->counts.slot_rows * record->counts.lanes, need = rve_head(record->arena)->need_pairs;
+  return need > slots ? need : slots;
+}
+
+/* Runs a call on the host; grows the arena as often as a list needs it. */
+static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const RveCall *call, Workspace *workspace) {
+  for (;;) {
+    RveScratch scratch;
+    TRY(reserve(workspace, &record->counts, pairs_for(record), &scratch));
+    const int outcome = batch->kernels->run(batch->features, call, record->arena, &record->counts, &scratch);
+    if (outcome != RVE_TOO_SMALL) return BASE_OK;
+    TRY(rve_record_grow(record));
+  }
+}
+
+static void measure_record(const RveBatch *batch, RveRecord *record, const RveCall *call, double work_before, double duration) {
+  RveHead *head = rve_head(record->arena);
+  if (!head->failed)
+    batch->kernels->measure(batch->features, call, record->arena, &record->counts, work_before, duration, &record->last);
+  if (head->failed) record->last.status = BASE_ERROR_UNSTABLE;
+}
+
+static const RveInput nothing = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0};
+
+/* Lists and forces of the present state, without time passing and without work done; then the answer. */
+static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, Workspace *workspace) {
+  RveHead *head = rve_head(record->arena);
+  RveCall call;
+  const double friction = head->friction_work, damping = head->damping_work;
+  TRY(rve_call_make(&batch->scene, head, &nothing, 0.0, &call));
+  TRY(run_record(batch, record, &call, workspace));
+  head = rve_head(record->arena);
+  head->friction_work = friction, head->damping_work = damping;
+  measure_record(batch, record, &call, friction, 0.0);
+  return BASE_OK;
+}
+
+static BaseStatus step_record(const RveBatch *batch, RveRecord *record, const RveInput *input, double duration,
+                              Workspace *workspace) {
+  RveCall call;
+  const double work_before = rve_head(record->arena)->friction_work;
+  TRY(rve_call_make(&batch->scene, rve_head(record->arena), input, duration, &call));
+  if (rve_head(record->arena)->failed) {
+    record->last.status = BASE_ERROR_UNSTABLE;
+    return BASE_OK;
+  }
+  if (call.steps > 0) TRY(run_record(batch, record, &call, workspace));
+  measure_record(batch, record, &call, work_before, duration);
+  return BASE_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------------------ creation */
+
+static BaseStatus check_arguments(const RveScene *scene, const RvePacking *packings, int packing_count,
+                                  const int *packing_of_rve, int count) {
+  TRY(rve_scene_check(scene));
+  if (count < 1) return base_error(BASE_ERROR_ARGUMENT, "a batch of %d RVEs (allowed: at least 1)", count);
+  if (packing_count < 1) return base_error(BASE_ERROR_ARGUMENT, "a batch from %d packings (allowed: at least 1)", packing_count);
+  for (int k = 0; k < packing_count; k++) {
+    BaseStatus status = rve_packing_check(&packings[k]);
+    if (status != BASE_OK) return base_error_context(status, "packing %d: ", k);
+    if (packings[k].dimension != scene->dimension)
+      return base_error(BASE_ERROR_ARGUMENT, "packing %d: dimension = %d (allowed: the scene's, %d)", k, packings[k].dimension,
+                        scene->dimension);
+  }
+  for (int k = 0; packing_of_rve && k < count; k++)
+    if (packing_of_rve[k] < 0 || packing_of_rve[k] >= packing_count)
+      return base_error(BASE_ERROR_ARGUMENT, "RVE %d has packing %d (allowed: 0 to %d)", k, packing_of_rve[k], packing_count - 1);
+  return BASE_OK;
+}
+
+static BaseStatus set_threads(RveBatch *batch) {
+  const int threads = batch->scene.threads > 0 ? batch->scene.threads : omp_get_max_threads();
+  if (threads > batch->threads) {
+    TRY(BASE_GROW((size_t)batch->threads, (size_t)threads, &batch->workspace));
+    batch->threads = threads;
+  }
+  return BASE_OK;
+}
+static int threads_of(const RveBatch *batch) {
+  const int threads = batch->scene.threads > 0 ? batch->scene.threads : omp_get_max_threads();
+  return threads < batch->threads ? threads : batch->threads;
+}
+
+static BaseStatus choose_backend(RveBatch *batch, RveBackend backend) {
+  batch->kernels = choose_kernels();
+  strcpy(batch->name, "cpu/");
+  strcat(batch->name, batch->kernels->name);
+  if (backend == RVE_BACKEND_CPU || (backend == RVE_BACKEND_AUTO && !rve_device_present())) return BASE_OK;
+  const RveKernels *layout;
+  BaseStatus status = rve_device_create(&layout, &batch->device);
+  if (status != BASE_OK && backend == RVE_BACKEND_AUTO) return BASE_OK;
+  TRY(status);
+  batch->kernels = layout;
+  strcpy(batch->name, "cuda");
+  return BASE_ALLOC((size_t)batch->count, &batch->job);
+}
+
+static BaseStatus upload(RveBatch *batch, int k) {
+  const RveRecord *record = &batch->record[k];
+  return batch->device ? rve_device_upload(batch->device, k, &record->counts, record->bytes, record->arena) : BASE_OK;
+}
+static BaseStatus download(const RveBatch *batch, int k) {
+  return batch->device ? rve_device_download(batch->device, k, batch->record[k].arena) : BASE_OK;
+}
+
+static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration);
+
+/* Lists, forces and answers of RVEs index[0..n), after a change from outside. */
+static BaseStatus refresh(RveBatch *batch, int n, const int *index) {
+  BaseStatus first = BASE_OK;
+  if (batch->device) {
+    for (int k = 0; k < n; k++) TRY(upload(batch, index ? index[k] : k));
+    return device_step(batch, n, index, NULL, 0.0);
+  }
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
+  for (int k = 0; k < n; k++) {
+    BaseStatus status = refresh_record(batch, &batch->record[index ? index[k] : k], &batch->workspace[omp_get_thread_num()]);
+    if (status != BASE_OK) {
+#pragma omp critical(rve_refresh)
+      first = status;
+    }
+  }
+  return first == BASE_ERROR_MEMORY ? base_error(first, "not enough memory for the neighbour lists of %d RVEs", n) : first;
+}
+
+BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, int packing_count, const int *packing_of_rve,
+                            int count, RveBackend backend, RveBatch **result) {
+  RveBatch *batch = NULL;
+  RveRecord *model = NULL;
+  BaseStatus status;
+  *result = NULL;
+  TRY(check_arguments(scene, packings, packing_count, packing_of_rve, count));
+  TRY(BASE_ALLOC(1, &batch));
+  batch->scene = *scene;
+  batch->features = rve_scene_features(scene);
+  batch->count = count;
+  TRY_GOTO(choose_backend(batch, backend), status, failed);
+  TRY_GOTO(set_threads(batch), status, failed);
+  TRY_GOTO(BASE_ALLOC((size_t)count, &batch->record), status, failed);
+  TRY_GOTO(BASE_ALLOC((size_t)packing_count, &model), status, failed);
+  for (int k = 0; k < packing_count; k++)
+    TRY_GOTO(rve_record_from_packing(batch->kernels, scene, &packings[k], &model[k]), status, failed);
+  for (int k = 0; k < count; k++) {
+    const RveRecord *from = &model[packing_of_rve ? packing_of_rve[k] : 0];
+    RveRecord *to = &batch->record[k];
+    TRY_GOTO(base_alloc(from->bytes, 1, &to->arena), status, failed);
+    memcpy(to->arena, from->arena, from->bytes);
+    to->counts = from->counts;
+    to->bytes = from->bytes;
+    rve_layout(&to->counts, to->arena, &to->arrays);
+  }
+  TRY_GOTO(refresh(batch, count, NULL), status, failed);
+  for (int k = 0; k < count; k++)
+    if (rve_head(batch->record[k].arena)->failed) {
+      status = base_error(BASE_ERROR_ARGUMENT, "RVE %d: the cell is too narrow for its grains", k);
+      goto failed;
+    }
+  *result = batch;
+  batch = NULL;
+failed:
+  for (int k = 0; model && k < packing_count; k++) rve_record_destroy(&model[k]);
+  base_free(model);
+  rve_batch_destroy(batch);
+  return status;
+}
+
+void rve_batch_destroy(RveBatch *batch) {
+  if (!batch) return;
+  for (int k = 0; batch->record && k < batch->count; k++) rve_record_destroy(&batch->record[k]);
+  for (int k = 0; k < batch->threads; k++) base_free(batch->workspace[k].memory);
+  rve_device_destroy(batch->device);
+  base_free(batch->workspace);
+  base_free(batch->job);
+  base_free(batch->record);
+  base_free(batch);
+}
+
+int rve_batch_count(const RveBatch *batch) { return batch->count; }
+const char *rve_batch_backend_name(const RveBatch *batch) { return batch->name; }
+const RveScene *rve_batch_scene(const RveBatch *batch) { return &batch->scene; }
+
+/* ------------------------------------------------------------------------------------------------------------ stepping */
+
+static BaseStatus check_index(const RveBatch *batch, int n, const int *index) {
+  if (n < 0 || (!index && n > batch->count) || (index && n > batch->count))
+    return base_error(BASE_ERROR_ARGUMENT, "%d RVEs (allowed: 0 to %d)", n, batch->count);
+  for (int k = 0; index && k < n; k++)
+    if (index[k] < 0 || index[k] >= batch->count)
+      return base_error(BASE_ERROR_ARGUMENT, "index[%d] = %d (allowed: 0 to %d)", k, index[k], batch->count - 1);
+  return BASE_OK;
+}
+
+static BaseStatus check_input(const RveBatch *batch, int n, const RveInput *input, double duration) {
+  if (!(duration >= 0.0 && isfinite(duration)))
+    return base_error(BASE_ERROR_ARGUMENT, "duration = %g (allowed: >= 0)", duration);
+  for (int k = 0; k < n; k++) {
+    double sum = batch->scene.thermal ? input[k].temperature : 0.0;
+    for (int m = 0; m < 9; m++) sum += input[k].velocity_gradient[m];
+    if (!isfinite(sum)) return base_error(BASE_ERROR_ARGUMENT, "input %d: velocity gradient or temperature is not finite", k);
+  }
+  return BASE_OK;
+}
+
+/* One launch runs all jobs; those whose arena was too small grow on the host and go on. */
+static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
+  int count = 0;
+  for (int k = 0; k < n; k++) {
+    const int rve = index ? index[k] : k;
+    RveDeviceJob *job = &batch->job[count];
+    const RveHead *head = rve_head(batch->record[rve].arena);
+    if (head->failed) continue;
+    memset(job, 0, sizeof *job);
+    TRY(rve_call_make(&batch->scene, head, input ? &input[k] : &nothing, duration, &job->call));
+    job->rve = rve;
+    job->work_before = batch->record[rve].last.friction_work;
+    job->duration = duration;
+    job->answer = batch->record[rve].last;
+    count++;
+  }
+  for (int pending = count; pending > 0;) {
+    TRY(rve_device_run(batch->device, batch->features, batch->job, pending));
+    int left = 0;
+    for (int k = 0; k < pending; k++) {
+      RveDeviceJob *job = &batch->job[k];
+      RveRecord *record = &batch->record[job->rve];
+      if (job->outcome == RVE_TOO_SMALL) {
+        TRY(download(batch, job->rve));
+        TRY(rve_record_grow(record));
+        TRY(upload(batch, job->rve));
+        batch->job[left++] = *job;
+        continue;
+      }
+      record->last = job->answer;
+      rve_head(record->arena)->failed = record->last.status;
+      rve_head(record->arena)->temperature = job->call.temperature;
+    }
+    pending = left;
+  }
+  return BASE_OK;
+}
+
+BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration,
+                          RveAnswer *answer) {
+  TRY(check_index(batch, n, index));
+  TRY(check_input(batch, n, input, duration));
+  TRY(set_threads(batch));
+  BaseStatus first = BASE_OK;
+  if (batch->device) {
+    TRY(device_step(batch, n, index, input, duration));
+  } else {
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
+    for (int k = 0; k < n; k++) {
+      BaseStatus status = step_record(batch, &batch->record[index ? index[k] : k], &input[k], duration,
+                                      &batch->workspace[omp_get_thread_num()]);
+      if (status != BASE_OK) {
+#pragma omp critical(rve_step)
+        first = status;
+      }
+    }
+  }
+  if (first == BASE_ERROR_MEMORY) return base_error(first, "not enough memory for a larger neighbour list");
+  if (first != BASE_OK)
+    return base_error(first, "a step of %g s takes more DEM steps than are allowed (time step %g s)", duration,
+                      batch->scene.time_step);
+  int unstable = -1;
+  for (int k = n - 1; k >= 0; k--) {
+    answer[k] = batch->record[index ? index[k] : k].last;
+    if (answer[k].status != BASE_OK) unstable = index ? index[k] : k;
+  }
+  if (unstable >= 0)
+    return base_error(BASE_ERROR_UNSTABLE, "RVE %d is unstable: a grain ran away, a value is not finite, or the cell is too narrow",
+                      unstable);
+  return BASE_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------------------- changes */
+
+BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
+  const RveScene *old = &batch->scene;
+  TRY(rve_scene_check(scene));
+  if (rve_scene_hash(scene) != rve_scene_hash(old))
+    return base_error(BASE_ERROR_ARGUMENT, "dimension, grain, thickness, density, thermal, bonds and whether tangential_stiffness "
+                                           "is 0 cannot change after creation");
+  const int stiffer = scene->normal_stiffness != old->normal_stiffness ||
+                      scene->tangential_stiffness != old->tangential_stiffness ||
+                      scene->normal_viscosity != old->normal_viscosity || scene->rotation != old->rotation ||
+                      scene->tangential_viscosity != old->tangential_viscosity ||
+                      scene->critical_damping != old->critical_damping;
+  for (int k = 0; stiffer && k < batch->count; k++) {
+    RvePacking packing;
+    TRY(rve_batch_packing(batch, k, &packing));
+    rve_head(batch->record[k].arena)->critical_time_step = rve_critical_time_step(scene, &packing);
+    rve_record_set_rotation(&batch->record[k], scene);
+    rve_packing_destroy(&packing);
+    TRY(upload(batch, k));
+  }
+  batch->scene = *scene;
+  batch->features = rve_scene_features(scene);
+  TRY(set_threads(batch));
+  /* Rows hold masses only in viscous variants; forces follow the new stiffness. */
+  return stiffer ? refresh(batch, batch->count, NULL) : BASE_OK;
+}
+
+BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index) {
+  if (!batch->scene.bonds) return base_error(BASE_ERROR_ARGUMENT, "bonds = 0 (allowed: scenes with bonds)");
+  if (!index && n == 0) n = batch->count;
+  TRY(check_index(batch, n, index));
+  for (int k = 0; k < n; k++) {
+    const int rve = index ? index[k] : k;
+    TRY(download(batch, rve));
+    rve_record_install_bonds(&batch->record[rve]);
+  }
+  return refresh(batch, n, index);
+}
+
+BaseStatus rve_batch_rest(RveBatch *batch, int n, const int *index) {
+  if (!index && n == 0) n = batch->count;
+  TRY(check_index(batch, n, index));
+  for (int k = 0; k < n; k++) {
+    const int rve = index ? index[k] : k;
+    TRY(download(batch, rve));
+    rve_record_rest(&batch->record[rve]);
+  }
+  return refresh(batch, n, index);
+}
+
+/* -------------------------------------------------------------------------------------------------- states in and out */
+
+static BaseStatus check_rve(const RveBatch *batch, int rve) {
+  if (rve < 0 || rve >= batch->count)
+    return base_error(BASE_ERROR_ARGUMENT, "RVE %d (allowed: 0 to %d)", rve, batch->count - 1);
+  return BASE_OK;
+}
+
+size_t rve_batch_state_bytes(const RveBatch *batch, int rve) {
+  return rve < 0 || rve >= batch->count ? 0 : rve_record_state_bytes(&batch->record[rve]);
+}
+
+BaseStatus rve_batch_pack(const RveBatch *batch, int rve, void *bytes, size_t *written) {
+  TRY(check_rve(batch, rve));
+  TRY(download(batch, rve));
+  return rve_record_pack(&batch->record[rve], rve_scene_hash(&batch->scene), bytes, written);
+}
+
+BaseStatus rve_batch_unpack(RveBatch *batch, int rve, const void *bytes, size_t size) {
+  int canonical;
+  TRY(check_rve(batch, rve));
+  TRY(rve_record_unpack(batch->kernels, rve_scene_hash(&batch->scene), bytes, size, &batch->record[rve], &canonical));
+  if (canonical) return refresh(batch, 1, &rve);
+  return upload(batch, rve);
+}
+
+BaseStatus rve_batch_view(const RveBatch *batch, int rve, RveView *view) {
+  memset(view, 0, sizeof *view);
+  TRY(check_rve(batch, rve));
+  TRY(download(batch, rve));
+  return rve_record_view(&batch->record[rve], view);
+}
+
+BaseStatus rve_batch_packing(const RveBatch *batch, int rve, RvePacking *packing) {
+  memset(packing, 0, sizeof *packing);
+  TRY(check_rve(batch, rve));
+  TRY(download(batch, rve));
+  return rve_record_packing(&batch->record[rve], packing);
+}
+
+BaseStatus rve_batch_conduct(const RveBatch *batch, int rve, double time_step, int64_t steps, double *temperature) {
+  TRY(check_rve(batch, rve));
+  TRY(download(batch, rve));
+  return rve_record_conduct(&batch->record[rve], &batch->scene, time_step, steps, temperature);
+}
