@@ -13,6 +13,7 @@
 #include "fix_mpm_rve.h"
 #include "fix_mpm_traction.h"
 #include "fix_mpm_wall.h"
+#include "force.h"
 #include "group.h"
 #include "keyword_parser.h"
 #include "lattice.h"
@@ -174,7 +175,17 @@ void FixMPMCouple::init() {
   create_mpm();
   find_walls_and_tractions();
   start_points();
+  set_sort_bins();
   just_created = 0; /* Modify::setup would reset the state of a new fix */
+}
+
+/* LIGGGHTS sorts particles by bins of half a neighbour cutoff. Without a pair style there is none, and it would end. */
+void FixMPMCouple::set_sort_bins() {
+  if (force->pair || atom->sortfreq <= 0) return;
+  char keyword[] = "sort";
+  std::string every = std::to_string(atom->sortfreq), size = format_text("%.17g", scene_.spacing);
+  char *words[] = {keyword, &every[0], &size[0]};
+  atom->modify_params(3, words);
 }
 
 void FixMPMCouple::check_domain() {

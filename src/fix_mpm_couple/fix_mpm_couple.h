@@ -155,6 +155,7 @@ class FixMPMCouple : public Fix {
   void take_size_from_lattice();
   void exclude_from_neighbor_lists();
 
+  void set_sort_bins();
   void check_domain();
   void check_other_fixes();
   int find_point_type();
