@@ -310,7 +310,7 @@ MPM_INLINE void update_affine(const Mpm *mpm, MpmPoint *point, const int *row, c
   const int width = mpm_shape_width(shape);
   double slope[3][MPM_WIDTH_MAX];
   MpmVec before[3], change[3];
-  for (int i = 0; i < dimension; i++) mpm_shape_affine(shape, w->f[i], w->value[i], w->slope[i], slope[i]);
+  for (int i = 0; i < dimension; i++) mpm_shape_affine(shape, w->f[i], w->value[i], slope[i]);
   gather_gradient(mpm->grid.state, row, w, slope, dimension, width, before);
   gather_gradient(mpm->grid.rate, row, w, slope, dimension, width, change);
   for (int i = 0; i < dimension; i++)

@@ -151,7 +151,8 @@ static void angular_momentum_is_lost_as_each_transfer_promises(void **state) {
     AT_MOST(fabs(loss[4] - loss[2]), 1e-12); /* XPIC(1) is PIC */
     AT_MOST(loss[5], 0.8 * loss[2]);         /* and higher orders filter less */
     AT_MOST(loss[6], 0.8 * loss[5]);
-    AT_MOST(fabs(loss[3]), 1e-8);            /* APIC: a rigid rotation is reproduced */
+    /* APIC reproduces a rigid rotation; linear loses the matrix of the points within 2 % of a node, here about 1e-3. */
+    AT_MOST(fabs(loss[3]), shape == MPM_SHAPE_LINEAR ? 2e-3 : 1e-8);
     AT_MOST(loss[1], 0.2 * loss[2]);         /* a tenth of PIC's loss per step */
   }
 }
