@@ -112,7 +112,7 @@ BaseStatus rve_law_create_missing(MPI_Comm comm, RveFarm *farm, RveStore *store)
 static BaseStatus assign(RveLaw *law, int n, const int64_t *tags, int forget) {
   TRY(rve_farm_assign(law->farm, n, tags, forget));
   for (int h = rve_store_next(law->store, -1); h >= 0; h = rve_store_next(law->store, h))
-    if (rve_farm_handle(law->farm, rve_store_record(law->store, h)->tag) != h) rve_store_release(law->store, h);
+    if (rve_farm_handle(law->farm, rve_store_item(law->store, h)->tag) != h) rve_store_release(law->store, h);
   return rve_law_create_missing(law->comm, law->farm, law->store);
 }
 
@@ -164,8 +164,8 @@ BaseStatus rve_law_set_volumes(RveLaw *law, int n, const int64_t *tags, const do
   rve_farm_send(law->farm, 1, volumes, law->request_value);
   const int requests = rve_farm_requests(law->farm, &asked, &handles);
   for (int q = 0; q < requests; q++) {
-    RveRecord *record = rve_store_record(law->store, handles[q]);
-    record->scale = law->request_value[q] / record->answer.volume;
+    RveStoreItem *item = rve_store_item(law->store, handles[q]);
+    item->scale = law->request_value[q] / item->answer.volume;
   }
   return BASE_OK;
 }
@@ -177,8 +177,8 @@ static void pack_input(const MpmLawBatch *batch, double *value) {
   }
 }
 
-static void pack_answer(const RveRecord *record, double *value) {
-  const RveAnswer *answer = &record->answer;
+static void pack_answer(const RveStoreItem *item, double *value) {
+  const RveAnswer *answer = &item->answer;
   double *scalars = value + OUT_SCALARS;
   memcpy(value + OUT_STRESS, answer->stress, sizeof answer->stress);
   memcpy(value + OUT_CONDUCTIVITY, answer->conductivity, sizeof answer->conductivity);
@@ -189,7 +189,7 @@ static void pack_answer(const RveRecord *record, double *value) {
   scalars[MPM_LAW_BOND_FRACTION] = answer->bond_fraction;
   scalars[MPM_LAW_UNBALANCED] = answer->unbalanced;
   scalars[MPM_LAW_ENERGY_DENSITY] = (answer->elastic_energy + answer->kinetic_energy) / answer->volume;
-  scalars[MPM_LAW_DISSIPATION] = record->dissipation;
+  scalars[MPM_LAW_DISSIPATION] = item->dissipation;
 }
 
 static void unpack_answers(const double *value, MpmLawBatch *batch) {
@@ -202,25 +202,43 @@ static void unpack_answers(const double *value, MpmLawBatch *batch) {
   }
 }
 
+/* The lowest tag among the requests whose input is not finite, 0 if all are. */
+static int64_t bad_request(const RveLaw *law, int requests, const int64_t *tags) {
+  int64_t lowest = 0;
+  for (int q = 0; q < requests; q++) {
+    const RveInput *input = &law->request_input[q];
+    int finite = isfinite(input->temperature);
+    for (int k = 0; k < 9; k++) finite = finite && isfinite(input->velocity_gradient[k]);
+    if (!finite && (lowest == 0 || tags[q] < lowest)) lowest = tags[q];
+  }
+  return lowest;
+}
+
 /* This rank's RVEs; the error of the lowest tag on any rank is everybody's. */
 static BaseStatus step_requests(RveLaw *law, double dt) {
   const int64_t *asked;
   const int *handles;
-  int unstable;
-  int64_t key = INT64_MIN; /* an error that is no RVE's own comes first */
+  int unstable = -1;
   const int requests = rve_farm_requests(law->farm, &asked, &handles);
-  BaseStatus status = rve_store_step(law->store, requests, handles, law->request_input, dt, &unstable);
-  if (status == BASE_ERROR_UNSTABLE && unstable >= 0) {
-    key = rve_store_record(law->store, unstable)->tag;
-    status = base_error(status, "the RVE of material point %" PRId64 " is unstable: a value in it is not finite", key);
+  int64_t key = bad_request(law, requests, asked);
+  BaseStatus status;
+  if (key > 0)
+    status = base_error(BASE_ERROR_UNSTABLE, "material point %" PRId64
+                        ": its velocity gradient or temperature is not finite", key);
+  else
+    status = rve_store_step(law->store, requests, handles, law->request_input, dt, &unstable);
+  if (unstable >= 0) {
+    key = rve_store_item(law->store, unstable)->tag;
+    status = base_error(BASE_ERROR_UNSTABLE, "the RVE of material point %" PRId64 " is unstable: a grain ran away or a "
+                        "value is not finite", key);
   }
   TRY(rank_agree(law->comm, status, key));
 
   law->worst_unbalanced = 0.0;
   for (int q = 0; q < requests; q++) {
-    const RveRecord *record = rve_store_record(law->store, handles[q]);
-    law->worst_unbalanced = fmax(law->worst_unbalanced, record->answer.unbalanced);
-    pack_answer(record, law->request_value + (size_t)q * OUTPUT_WIDTH);
+    const RveStoreItem *item = rve_store_item(law->store, handles[q]);
+    law->worst_unbalanced = fmax(law->worst_unbalanced, item->answer.unbalanced);
+    pack_answer(item, law->request_value + (size_t)q * OUTPUT_WIDTH);
   }
   if (dt > 0.0) law->rves_run = requests;
   return BASE_OK;

@@ -22,10 +22,10 @@ static int by_tag(const void *a, const void *b) {
 static int own_shares(const RveLaw *law, Share *share) {
   int n = 0;
   for (int h = rve_store_next(law->store, -1); h >= 0; h = rve_store_next(law->store, h)) {
-    const RveRecord *record = rve_store_record(law->store, h);
-    const RveAnswer *answer = &record->answer;
-    share[n++] = (Share){record->tag, record->scale * answer->friction_work, record->scale * answer->damping_work,
-                         record->scale * (answer->elastic_energy + answer->kinetic_energy)};
+    const RveStoreItem *item = rve_store_item(law->store, h);
+    const RveAnswer *answer = &item->answer;
+    share[n++] = (Share){item->tag, item->scale * answer->friction_work, item->scale * answer->damping_work,
+                         item->scale * (answer->elastic_energy + answer->kinetic_energy)};
   }
   return n;
 }

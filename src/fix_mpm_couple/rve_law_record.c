@@ -28,7 +28,7 @@ typedef struct Header {
 typedef struct Entry {
   int64_t tag;
   uint64_t size; /* of its state, bytes; the state takes padded(size) */
-  double scale, temperature, dissipation;
+  double scale, dissipation;
 } Entry;
 
 static size_t padded(size_t size) { return (size + 7) / 8 * 8; }
@@ -84,11 +84,11 @@ static BaseStatus pack_part(RveLaw *law, Part *part) {
   TRY(BASE_ALLOC((size_t)own, &part->entry));
   TRY(BASE_ALLOC(room, &part->states));
   for (int k = 0; k < own; k++) {
-    const RveRecord *record = rve_store_record(law->store, handles[k]);
+    const RveStoreItem *item = rve_store_item(law->store, handles[k]);
     size_t written;
     TRY(rve_store_pack(law->store, handles[k], part->states + part->bytes, &written));
     part->entry[part->count++] =
-        (Entry){record->tag, written, record->scale, record->temperature, record->dissipation};
+        (Entry){item->tag, written, item->scale, item->dissipation};
     part->bytes += padded(written);
   }
   return BASE_OK;
@@ -327,9 +327,7 @@ static BaseStatus restore_states(const char *bytes, const Header *header, RveFar
       BaseStatus status = rve_store_unpack(store, handle, state, entry.size);
       if (status != BASE_OK)
         return base_error_context(status, "RVE restart record, material point %" PRId64 ": ", entry.tag);
-      RveRecord *record = rve_store_record(store, handle);
-      record->scale = entry.scale;
-      record->temperature = entry.temperature;
+      rve_store_item(store, handle)->scale = entry.scale;
     }
     state += padded(entry.size);
   }
@@ -337,7 +335,7 @@ static BaseStatus restore_states(const char *bytes, const Header *header, RveFar
   for (uint64_t k = 0; k < header->rves; k++) {
     const Entry entry = entry_of(bytes, k);
     const int handle = rve_farm_handle(farm, entry.tag);
-    if (handle >= 0) rve_store_record(store, handle)->dissipation = entry.dissipation;
+    if (handle >= 0) rve_store_item(store, handle)->dissipation = entry.dissipation;
   }
   return BASE_OK;
 }

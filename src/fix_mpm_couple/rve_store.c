@@ -12,7 +12,7 @@ enum { MOST_BATCHES = 8 };
 typedef struct Slot {
   int batch; /* -1: unused, `rve` is then the next unused slot or -1 */
   int rve;
-  RveRecord record;
+  RveStoreItem item;
 } Slot;
 
 struct RveStore {
@@ -152,7 +152,7 @@ static BaseStatus merge_batches(RveStore *store) {
   RveBatch *merged = NULL;
   TRY(BASE_ALLOC((size_t)store->slots, &packing));
   for (int s = 0; s < store->slots; s++)
-    if (store->slot[s].batch >= 0) packing[living++] = store->slot[s].record.packing;
+    if (store->slot[s].batch >= 0) packing[living++] = store->slot[s].item.packing;
   BaseStatus status = BASE_OK;
   if (living > 0)
     status = rve_batch_create(&store->scene, store->packing, store->packing_count, packing, living, store->backend,
@@ -179,8 +179,7 @@ BaseStatus rve_store_add(RveStore *store, int n, const int64_t *tag, const int *
   TRY(rve_store_reserve(store, n));
   TRY(rve_batch_create(&store->scene, store->packing, store->packing_count, packing, n, store->backend, &batch));
   /* The first answers, so that volume and energies are known before the first step. */
-  for (int k = 0; k < n; k++)
-    store->input[k] = (RveInput){.temperature = store->scene.thermal ? store->scene.reference_temperature : 0.0};
+  memset(store->input, 0, (size_t)n * sizeof *store->input);
   BaseStatus status = rve_batch_step(batch, n, NULL, store->input, 0.0, store->answer);
   if (status != BASE_OK) {
     rve_batch_destroy(batch);
@@ -192,8 +191,8 @@ BaseStatus rve_store_add(RveStore *store, int n, const int64_t *tag, const int *
     store->unused = slot->rve;
     slot->batch = store->batches;
     slot->rve = k;
-    slot->record = (RveRecord){.tag = tag[k], .packing = packing[k], .grains = store->packing[packing[k]].grains,
-                               .scale = NAN, .temperature = store->input[k].temperature, .answer = store->answer[k]};
+    slot->item = (RveStoreItem){.tag = tag[k], .packing = packing[k], .grains = store->packing[packing[k]].grains,
+                                .scale = NAN, .answer = store->answer[k]};
   }
   store->batch[store->batches++] = batch;
   return BASE_OK;
@@ -205,7 +204,7 @@ void rve_store_release(RveStore *store, int handle) {
   store->unused = handle;
 }
 
-RveRecord *rve_store_record(RveStore *store, int handle) { return &store->slot[handle].record; }
+RveStoreItem *rve_store_item(RveStore *store, int handle) { return &store->slot[handle].item; }
 
 int rve_store_next(const RveStore *store, int handle) {
   for (int s = handle + 1; s < store->slots; s++)
@@ -247,17 +246,15 @@ static void sort_by_batch(RveStore *store, int n, const int *handle, const RveIn
   }
 }
 
-static void keep_answer(RveStore *store, RveRecord *record, const RveInput *input, const RveAnswer *answer,
-                        double duration) {
-  const RveAnswer *before = &record->answer;
+static void keep_answer(RveStore *store, RveStoreItem *item, const RveAnswer *answer, double duration) {
+  const RveAnswer *before = &item->answer;
   const double work =
       (answer->friction_work - before->friction_work) + (answer->damping_work - before->damping_work);
   if (duration > 0.0) {
-    record->dissipation = work / (answer->volume * duration);
-    store->particle_steps += (answer->steps - before->steps) * record->grains;
+    item->dissipation = work / (answer->volume * duration);
+    store->particle_steps += (answer->steps - before->steps) * item->grains;
   }
-  record->temperature = input->temperature;
-  record->answer = *answer;
+  item->answer = *answer;
 }
 
 BaseStatus rve_store_step(RveStore *store, int n, const int *handle, const RveInput *input, double duration,
@@ -276,10 +273,10 @@ BaseStatus rve_store_step(RveStore *store, int n, const int *handle, const RveIn
     if (status != BASE_OK) result = status;
   }
   for (int k = 0; k < n; k++) {
-    RveRecord *record = rve_store_record(store, store->asked[k]);
-    keep_answer(store, record, &store->input[k], &store->answer[k], duration);
-    if (record->answer.status == 0) continue;
-    if (*unstable < 0 || record->tag < rve_store_record(store, *unstable)->tag) *unstable = store->asked[k];
+    RveStoreItem *item = rve_store_item(store, store->asked[k]);
+    keep_answer(store, item, &store->answer[k], duration);
+    if (item->answer.status == 0) continue;
+    if (*unstable < 0 || item->tag < rve_store_item(store, *unstable)->tag) *unstable = store->asked[k];
   }
   if (duration > 0.0) store->seconds += base_seconds() - start;
   return result;
@@ -290,11 +287,8 @@ BaseStatus rve_store_refresh(RveStore *store) {
   RveInput *input = NULL;
   TRY(BASE_ALLOC((size_t)store->slots, &handle));
   BaseStatus status = BASE_ALLOC((size_t)store->slots, &input);
-  for (int s = 0; s < store->slots && status == BASE_OK; s++) {
-    if (store->slot[s].batch < 0) continue;
-    input[n].temperature = store->slot[s].record.temperature;
-    handle[n++] = s;
-  }
+  for (int s = 0; s < store->slots && status == BASE_OK; s++)
+    if (store->slot[s].batch >= 0) handle[n++] = s;
   if (status == BASE_OK) status = rve_store_step(store, n, handle, input, 0.0, &unstable);
   base_free(handle);
   base_free(input);
@@ -341,7 +335,7 @@ BaseStatus rve_store_view(const RveStore *store, int handle, RveView *view) {
 void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
   *totals = (RveStoreTotals){.particle_steps = store->particle_steps, .seconds = store->seconds};
   for (int s = 0; s < store->slots; s++)
-    if (store->slot[s].batch >= 0) totals->grains += store->slot[s].record.grains;
+    if (store->slot[s].batch >= 0) totals->grains += store->slot[s].item.grains;
 }
 
 const char *rve_store_backend_name(const RveStore *store) {

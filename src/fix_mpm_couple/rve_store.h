@@ -9,15 +9,14 @@
 typedef struct RveStore RveStore;
 
 /* What the store remembers of an RVE besides its state in the engine. */
-typedef struct RveRecord {
+typedef struct RveStoreItem {
   int64_t tag;        /* of its material point */
   int packing;        /* index of the packing it started from */
   int grains;
   double scale;       /* volume of the material point / of the RVE; NAN until told. Constant: both deform alike */
-  double temperature; /* last input */
   double dissipation; /* of the last step, slip and damping, W/m3 of current volume */
   RveAnswer answer;   /* last one */
-} RveRecord;
+} RveStoreItem;
 
 /* Copies scene and packings. BASE_ERROR_ARGUMENT (scene or packing wrong), BASE_ERROR_MEMORY. */
 BaseStatus rve_store_create(const RveScene *scene, const RvePacking *packings, int packing_count, RveBackend backend,
@@ -28,7 +27,7 @@ void rve_store_destroy(RveStore *store); /* accepts NULL */
 BaseStatus rve_store_add(RveStore *store, int n, const int64_t *tag, const int *packing, int *handle);
 /* Forgets an RVE; its memory is used again when RVEs are added later. */
 void rve_store_release(RveStore *store, int handle);
-RveRecord *rve_store_record(RveStore *store, int handle);
+RveStoreItem *rve_store_item(RveStore *store, int handle);
 /* The next living handle after `handle` (-1: the first); -1 at the end. */
 int rve_store_next(const RveStore *store, int handle);
 const RveScene *rve_store_scene(const RveStore *store);
@@ -36,11 +35,11 @@ const RvePacking *rve_store_packings(const RveStore *store, int *count);
 
 /* Room for steps of n RVEs: nothing is allocated inside rve_store_step() then. */
 BaseStatus rve_store_reserve(RveStore *store, int n);
-/* Advances RVEs handle[0..n), each named once, by `duration` s; answers are left in the records.
+/* Advances RVEs handle[0..n), each named once, by `duration` s; answers are left in the items.
  * BASE_ERROR_UNSTABLE: *unstable is the handle of the one with the lowest tag; -1 else. */
 BaseStatus rve_store_step(RveStore *store, int n, const int *handle, const RveInput *input, double duration,
                           int *unstable);
-/* Answers for the present state, without stepping, into the records of all RVEs. */
+/* Answers for the present state, without stepping, into the items of all RVEs. */
 BaseStatus rve_store_refresh(RveStore *store);
 
 /* As the functions of the same name in rve.h, for all RVEs. */
