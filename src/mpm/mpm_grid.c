@@ -8,7 +8,7 @@
 enum { MPM_SLAB = 4 /* layers of cells; >= support width - 1, so that slabs of one colour share no node */ };
 
 static BaseStatus reserve_cells(MpmGrid *grid, int cells) {
-  if (cells <= grid->cell_room) return BASE_OK;
+  if (cells <= grid->cell_room && grid->cell_room > 0) return BASE_OK; /* without points the end mark needs room, too */
   const size_t room = (size_t)cells + (size_t)cells / 4 + 16, kept = (size_t)grid->cell_room;
   TRY(BASE_GROW(kept, room + 1, &grid->cell_key));
   TRY(BASE_GROW(kept, room + 1, &grid->cell_first));
