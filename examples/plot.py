@@ -314,8 +314,10 @@ def picture_of_front(runs, options):
 
 def picture_of_curves(runs, options):
     """Thermo columns over time: --curves NAME=COLUMN ..., by default the kinetic energy."""
-    wanted = [(name or column, column) for name, _, column in (text.rpartition("=") for text in options.curves)]
-    tables = [run.thermo() for run in runs]
+    # LIGGGHTS heads f_ID[i], c_ID and v_ID without the first two letters.
+    split = [text.rpartition("=") for text in options.curves]
+    wanted = [(name or column, re.sub("^[fcv]_", "", column)) for name, _, column in split]
+    tables = [{re.sub("^[fcv]_", "", name): values for name, values in run.thermo().items()} for run in runs]
     if not any(column in table for table in tables for _, column in wanted):
         return None
     figure, grid = plt.subplots(1, len(runs), squeeze=False, sharey=True, figsize=(4.4 * len(runs) + 0.6, 3.0))

@@ -73,6 +73,15 @@ class Run:
         return parse_dump((self.path / name).read_text())
 
 
+class Table(dict):
+    """Thermo columns by name. LIGGGHTS heads f_ID[i], c_ID and v_ID without the first two letters: both names find them."""
+
+    def __missing__(self, name):
+        if name[:2] in ("f_", "c_", "v_") and name[2:] in self:
+            return self[name[2:]]
+        raise KeyError(f"{name}; there are: {', '.join(self)}")
+
+
 def parse_thermo(log):
     """LIGGGHTS prints a header line of column names (first word Step), rows of numbers and `Loop time` at the end."""
     tables, columns = [], None
@@ -80,7 +89,7 @@ def parse_thermo(log):
         words = line.split()
         if words and words[0] == "Step":
             columns = words
-            tables.append({name: [] for name in columns})
+            tables.append(Table((name, []) for name in columns))
         elif line.startswith("Loop time"):
             columns = None
         elif columns and len(words) == len(columns):
