@@ -38,6 +38,10 @@ namespace LAMMPS_NS {
  * (material rve) or the particles' own `density` (material elastic). The particle's rmass becomes the point's mass,
  * its radius half the smallest edge.
  *
+ * Points have numbers (f[30] of a particle): they count by position, z first, then y, then x, the same on any number of
+ * ranks, whereas ids from create_atoms depend on it; on one rank both agree. Messages about points and fix mpm/vtk use
+ * them; with several packings point n gets packing (n - 1) modulo their number.
+ *
  * Global scalar: f[5] + f[6] + f[7], the mechanical energy. Global vector, sums over all points:
  *    1     mass, kg
  *    2-4   momentum, kg m/s
@@ -137,6 +141,7 @@ class FixMPMCouple : public Fix {
 
   double **state_ = NULL; /* [state_rows_][STATE_COLUMNS] */
   int state_rows_ = 0;
+  int64_t last_number_ = 0; /* of all points so far */
   std::vector<MpmPoint> points_; /* this rank's points, gathered from the particles */
   std::vector<int> particle_;    /* their indices */
   bigint points_before_exchange_ = -1;
@@ -144,7 +149,7 @@ class FixMPMCouple : public Fix {
 
   bigint totals_step_ = -1; /* of totals_; -1: none */
   double totals_[TOTALS] = {};
-  bool show_progress_ = false;
+  bool show_progress_ = false, progress_shown_ = false;
   double run_started_ = 0.0, progress_printed_ = 0.0;
   double particle_steps_before_ = 0.0, rve_seconds_before_ = 0.0;
 
@@ -170,6 +175,7 @@ class FixMPMCouple : public Fix {
   bool is_point(int i) const;
   void start_points();
   void start_point(int i);
+  void number_points(const std::vector<int> &started);
   void tell_volumes();
   void answer_points();
   void assign_rves();

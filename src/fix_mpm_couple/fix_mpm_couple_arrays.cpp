@@ -64,10 +64,10 @@ void FixMPMCouple::unpack_restart(int i, int nth) {
   memcpy(state_[i], extra + start + 1, STATE_COLUMNS * sizeof(double));
 }
 
-/* The global record only says how a point's record looks. */
+/* The global record says how a point's record looks. */
 struct CoupleRecord {
   char magic[8];
-  int64_t columns;
+  int64_t columns, last_number;
 };
 static const char RECORD_MAGIC[8] = {'m', 'p', 'm', 'c', 'o', 'u', 'p', '1'};
 
@@ -76,6 +76,7 @@ void FixMPMCouple::write_restart(FILE *file) {
   CoupleRecord record;
   memcpy(record.magic, RECORD_MAGIC, sizeof record.magic);
   record.columns = STATE_COLUMNS;
+  record.last_number = last_number_;
   const int size = sizeof record;
   fwrite(&size, sizeof size, 1, file);
   fwrite(&record, sizeof record, 1, file);
@@ -86,6 +87,7 @@ void FixMPMCouple::restart(char *bytes) {
   memcpy(&record, bytes, sizeof record);
   if (memcmp(record.magic, RECORD_MAGIC, sizeof record.magic) != 0 || record.columns != STATE_COLUMNS)
     fix_failed(lmp, this, "the restart file holds no points of this fix, or those of another version");
+  last_number_ = record.last_number;
 }
 
 double FixMPMCouple::memory_usage() {

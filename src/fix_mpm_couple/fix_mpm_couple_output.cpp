@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Global values for thermo_style, the progress line, the closing line. */
+#include <fcntl.h>
 #include <unistd.h>
 
-#include <cmath>
-#include <cstring>
+#include <cstdlib>
 
 #include "../base/tensor.h"
 #include "atom.h"
@@ -64,8 +64,19 @@ double FixMPMCouple::compute_vector(int k) {
 /* ---------------------------------------------------------------------------------------------------- how long it
  * takes */
 
+/* Open MPI gives every rank a terminal of its own; where the output really goes is known to mpirun, the parent. */
+static bool is_terminal() {
+  if (!isatty(STDOUT_FILENO)) return false;
+  const int parent = open(format_text("/proc/%d/fd/1", (int)getppid()).c_str(), O_WRONLY | O_NOCTTY | O_NONBLOCK);
+  if (parent < 0) return getenv("OMPI_COMM_WORLD_SIZE") == NULL;
+  const bool terminal = isatty(parent);
+  close(parent);
+  return terminal;
+}
+
 void FixMPMCouple::start_progress() {
-  show_progress_ = comm->me == 0 && screen == stdout && isatty(STDOUT_FILENO);
+  show_progress_ = comm->me == 0 && screen == stdout && is_terminal();
+  progress_shown_ = false;
   run_started_ = progress_printed_ = base_seconds();
   particle_steps_before_ = rve_seconds_before_ = 0.0;
   if (!rve_) return;
@@ -81,6 +92,7 @@ void FixMPMCouple::progress() {
   const double now = base_seconds();
   if (now - progress_printed_ < 1.0) return;
   progress_printed_ = now;
+  progress_shown_ = true;
   const double done = (double)(update->ntimestep - update->firststep),
                left = (double)(update->laststep - update->ntimestep);
   const double rate = done / (now - run_started_);
@@ -90,7 +102,7 @@ void FixMPMCouple::progress() {
 }
 
 void FixMPMCouple::post_run() {
-  if (show_progress_) fprintf(screen, "\r\033[K");
+  if (progress_shown_) fprintf(screen, "\r\033[K");
   if (!rve_) return;
   RveLawTotals law;
   fix_check(lmp, this, rve_law_totals(rve_->law(), &law));

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* One step: particles to points, the MPM step, points to particles; and what keeps points from getting lost. */
+#include <algorithm>
 #include <cstring>
 
 #include "atom.h"
+#include "comm.h"
 #include "domain.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
@@ -17,31 +19,65 @@ bool FixMPMCouple::is_point(int i) const { return atom->mask[i] & groupbit; }
 
 /* ---------------------------------------------------------------------------------------------------- new points */
 
+/* Collective. */
 void FixMPMCouple::start_points() {
   BaseStatus status = BASE_OK;
+  std::vector<int> started;
   for (int i = 0; i < atom->nlocal && status == BASE_OK; i++) {
     if (!is_point(i)) continue;
     if (state_[i][STATE_STAGE] == STAGE_NEW) {
-      if (!rve_ && !(atom->density[i] > 0.0))
-        status =
-            base_error(BASE_ERROR_ARGUMENT, "material point %d has density %g; set it by: set group GROUP density RHO",
-                       atom->tag[i], atom->density[i]);
-      else start_point(i);
+      if (rve_ || atom->density[i] > 0.0) start_point(i), started.push_back(i);
+      else
+        status = base_error(BASE_ERROR_ARGUMENT, "particle %d has density %g; set it by: set group GROUP density RHO",
+                            atom->tag[i], atom->density[i]);
     }
-    /* `set ... diameter` or `density` on points that have started would change rmass, which is the mass of the point.
-     */
+    /* `set ... diameter` or `density` on points that have started would change rmass, the mass of the point. */
     MpmPoint point;
     memcpy(&point, state_[i], sizeof point);
     atom->rmass[i] = point.mass;
   }
   fix_check(lmp, this, status);
+  number_points(started);
+}
+
+/* A point that waits for its number. Sorted as LIGGGHTS' create_atoms counts on one rank. */
+struct Unnumbered {
+  double position[3];
+  double id; /* tells points at the same place apart */
+  bool operator<(const Unnumbered &other) const {
+    for (int k = 2; k >= 0; k--)
+      if (position[k] != other.position[k]) return position[k] < other.position[k];
+    return id < other.id;
+  }
+};
+
+/* Numbers new points by position: z, then y, then x. LIGGGHTS' ids will not do, because create_atoms gives other ones
+ * on another number of ranks, and order of sums and choice of packings must not depend on that. Collective. */
+void FixMPMCouple::number_points(const std::vector<int> &started) {
+  const int mine = 4 * (int)started.size();
+  std::vector<int> count(comm->nprocs), first(comm->nprocs);
+  MPI_Allgather(&mine, 1, MPI_INT, count.data(), 1, MPI_INT, world);
+  int total = 0;
+  for (int r = 0; r < comm->nprocs; r++) first[r] = total, total += count[r];
+  if (total == 0) return;
+
+  std::vector<Unnumbered> own, all(total / 4);
+  for (int i : started) own.push_back({{atom->x[i][0], atom->x[i][1], atom->x[i][2]}, (double)atom->tag[i]});
+  MPI_Allgatherv(own.data(), mine, MPI_DOUBLE, all.data(), count.data(), first.data(), MPI_DOUBLE, world);
+  std::sort(all.begin(), all.end());
+  for (size_t k = 0; k < started.size(); k++) {
+    MpmPoint point;
+    memcpy(&point, state_[started[k]], sizeof point);
+    point.tag = last_number_ + 1 + (std::lower_bound(all.begin(), all.end(), own[k]) - all.begin());
+    memcpy(state_[started[k]], &point, sizeof point);
+  }
+  last_number_ += total / 4;
 }
 
 void FixMPMCouple::start_point(int i) {
   MpmPoint point;
   mpm_point_default(&point);
   if (rve_) atom->density[i] = bulk_density_;
-  point.tag = atom->tag[i];
   memcpy(point.size0, size0_, sizeof size0_);
   point.volume0 = size0_[0] * size0_[1] * size0_[2];
   point.mass = atom->density[i] * point.volume0;
@@ -100,7 +136,6 @@ void FixMPMCouple::gather() {
     if (!is_point(i)) continue;
     MpmPoint point;
     memcpy(&point, state_[i], sizeof point);
-    point.tag = atom->tag[i];
     point.heat_capacity = heat_capacity_;
     point.heat_external = 0.0;
     for (int k = 0; k < 3; k++) {
@@ -164,7 +199,8 @@ void FixMPMCouple::check_leaving(double **x) const {
   for (int i : particle_)
     if (status == BASE_OK && is_outside(x[i]))
       status = base_error(BASE_ERROR_UNSTABLE,
-                          "material point %d left the box at step %lld through a fixed boundary, at (%g, %g, %g): add "
+                          "the material point with particle id %d left the box at step %lld through a fixed boundary, "
+                          "at (%g, %g, %g): add "
                           "a fix mpm/wall, make the box "
                           "larger, or let points go by 'leaving delete'",
                           atom->tag[i], (long long)update->ntimestep, x[i][0], x[i][1], x[i][2]);

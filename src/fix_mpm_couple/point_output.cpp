@@ -87,4 +87,5 @@ void LAMMPS_NS::point_output(const MpmPoint &point, int dimension, double column
   column[OUTPUT_ENERGY_DENSITY] = point.scalars[MPM_LAW_ENERGY_DENSITY];
   column[OUTPUT_DISSIPATION] = point.scalars[MPM_LAW_DISSIPATION];
   memcpy(column + OUTPUT_DEFORMATION_GRADIENT, f, 9 * sizeof *f);
+  column[OUTPUT_NUMBER] = (double)point.tag;
 }

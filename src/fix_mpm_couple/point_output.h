@@ -25,7 +25,8 @@ enum PointOutput {
   OUTPUT_ENERGY_DENSITY,        /* 19: stored by the law, J/m3 */
   OUTPUT_DISSIPATION,           /* 20: of the law, all kinds, W/m3 */
   OUTPUT_DEFORMATION_GRADIENT,  /* 21-29: F row-major */
-  OUTPUT_COLUMNS = OUTPUT_DEFORMATION_GRADIENT + 9
+  OUTPUT_NUMBER = OUTPUT_DEFORMATION_GRADIENT + 9, /* 30: of the point, see fix_mpm_couple.h */
+  OUTPUT_COLUMNS
 };
 
 void point_output(const MpmPoint &point, int dimension, double column[OUTPUT_COLUMNS]);
