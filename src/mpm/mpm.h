@@ -126,8 +126,9 @@ BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt);
  * and temperature_law to temperature: call it once for new points, not for restarted ones. Collective. */
 BaseStatus mpm_initialise(Mpm *mpm, MpmPoint *points, int count);
 
-/* Critical time steps of this rank's points, s; INFINITY without points. Mechanical: h / (sqrt(M/rho) + |v|) times the limit of
- * verification B9; thermal: rho c h^2 / (b k_max), b = 2 (eq. 30-31 corrected). */
+/* Critical time steps of this rank's points, s; INFINITY without points. Mechanical: h / (sqrt(M/rho) + |v|) times half the limit of
+ * verification B9 (0.5 for FLIP, PIC, XPIC with USF or MUSL, 0.45 if linear; less for APIC and USL: mpm_critical.c). Thermal:
+ * rho c h^2 / (b k_max), b = 2, 10 if linear (eq. 30-31 corrected). */
 void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, double *mechanical, double *thermal);
 
 /* Sums over this rank's own points (caller reduces over ranks). */
