@@ -181,7 +181,10 @@ void FixMPMCouple::init() {
 
 /* LIGGGHTS sorts particles by bins of half a neighbour cutoff. Without a pair style there is none, and it would end. */
 void FixMPMCouple::set_sort_bins() {
-  if (force->pair || atom->sortfreq <= 0) return;
+  if (force->pair) return;
+  /* Nor are there lists to build; bins would fail in the flat boxes of 2D ("box size << cutoff"). 0: style nsq. */
+  neighbor->style = 0;
+  if (atom->sortfreq <= 0) return;
   char keyword[] = "sort";
   std::string every = std::to_string(atom->sortfreq), size = format_text("%.17g", scene_.spacing);
   char *words[] = {keyword, &every[0], &size[0]};
