@@ -30,6 +30,7 @@ def environment(threads=1):
         "OMPI_MCA_mpi_yield_when_idle": "1",
         "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
         "OMPI_MCA_btl_base_warn_component_unused": "0",
+        "OMPI_MCA_odls_base_sigkill_timeout": "0",  # after an error mpirun would wait a second or two for each rank
     }
     return {**os.environ, **settings}
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Wrong scripts. Each is BASE, which runs, with one piece of text replaced; and words that the error message must hold.
 
-A case: name, text of BASE, what stands there instead, words of the message. "Fix STYLE (id " is always expected too,
-unless the style is None (the message then comes from LIGGGHTS itself).
+A case: name, text of BASE, what stands there instead (or tuples of both), style of the fix that complains, words of its
+message. "Fix STYLE (id " is always expected too.
 """
 from collections import namedtuple
 
@@ -75,7 +75,13 @@ FILES = {
     "noradius.dump": DUMP.format(bounds="pp pp pp").replace(" radius", "").replace(" 0.5\n1", "\n1"),
 }
 
-Case = namedtuple("Case", "name old new style words")
+class Case(namedtuple("Case", "name old new style words")):
+    def script(self):
+        text = BASE
+        for old, new in zip(*((part,) if isinstance(part, str) else part for part in (self.old, self.new))):
+            assert text.count(old) == 1, f"{self.name}: '{old}' must stand once in BASE"
+            text = text.replace(old, new)
+        return text
 
 
 def packing(name, file, *words):
@@ -134,12 +140,13 @@ CASES = [
     rve("rve_bonds_negative", "bonds strength 0.1", "bonds strength -0.1", "'bonds'", "'-0.1'", "> 0"),
     rve("rve_bonds_melting", "melting 60", "melting soon", "'bonds'", "'soon'"),
     rve("rve_bonds_below_reference", "melting 60", "melting 10", "10", "20"),
+    rve("rve_melting_without_thermal", "thermal yes &\n  temperature 20", "thermal no &\n ", "'bonds'", "thermal yes"),
     rve("rve_substeps_negative", "substeps 2", "substeps -1", "'substeps'", "'-1'", "whole number"),
     rve("rve_substeps_fraction", "substeps 2", "substeps 2.5", "'substeps'", "'2.5'", "whole number"),
     rve("rve_substeps_huge", "substeps 2", "substeps 99999999999", "'substeps'", "whole number"),
     rve("rve_skin_negative", "skin 0.2", "skin -0.2", "'skin'", "'-0.2'", "> 0"),
     rve("rve_dem_step_zero", "skin 0.2", "timestep/dem 0", "'timestep/dem'", "'0'", "> 0"),
-    rve("rve_dem_step_huge", "substeps 2 skin 0.2", "timestep/dem 10", "time step", "10"),
+    rve("rve_dem_step_huge", "skin 0.2", "timestep/dem 10", "'timestep/dem'", "'10'", "> 0 and <=", "critical"),
     rve("rve_backend", "backend cpu", "backend opencl", "'backend'", "'opencl'", "auto, cpu or cuda"),
     rve("rve_threads", "threads 1", "threads -3", "'threads'", "'-3'", "whole number"),
     rve("rve_rotation", "skin 0.2", "rotation maybe", "'rotation'", "'maybe'", "no or yes"),
@@ -223,12 +230,13 @@ CASES = [
     couple("couple_no_points", "create_atoms    1 region column\n", "", "all", "no particles"),
     couple("couple_other_integrator", "thermo_style", "fix move all nve/sphere\nthermo_style", "fix move",
            "nve/sphere"),
-    couple("couple_period", "boundary        f f p", "boundary        p f p", "period"),
+    couple("couple_period", ("boundary        f f p", "block -1 3 -1 3"), ("boundary        p f p", "block -1 3.1 -1 3"),
+           "period", "20.5", "whole multiple"),
     couple("couple_triclinic", "region          box block -1 3 -1 3 -0.025 0.025 units box",
            "region          box prism -1 3 -1 3 -0.025 0.025 0.1 0 0 units box", "triclinic"),
     couple("couple_minimize", "run             2", "minimize 0 0 10 10", "minimize"),
     couple("couple_not_granular", "atom_style      granular", "atom_style      atomic", "granular"),
-    couple("couple_leaves_box", "gravity 9.8 vector 0 -1 0", "gravity 1e5 vector 1 0 0", "left the box",
+    couple("couple_leaves_box", "gravity 9.8 vector 0 -1 0", "gravity 1e9 vector 0 1 0", "left the box",
            "leaving delete"),
     couple("couple_force_not_finite", "thermo_style", "variable bad equal exp(1000)-exp(1000)\n"
            "fix push all addforce v_bad 0 0\nthermo_style", "finite", "point 1"),
@@ -254,8 +262,10 @@ CASES = [
     wall("wall_velocity_z", "velocity 0 0 0", "velocity 0 0 1", "'velocity'", "vz", "2D"),
     wall("wall_side", "plane y -0.1 friction 0.5", "plane y -0.1 friction 0.5 side up", "'side'", "'up'", "- or +"),
     wall("wall_inside_body", "plane y -0.1 friction 0.5", "plane y 0.21 friction 0.5", "'side'", "both sides"),
-    wall("wall_heat_without_thermal", "thermal yes &\n  temperature 20", "thermal no &\n ", "'temperature'",
-           "thermal yes"),
+    wall("wall_heat_without_thermal", ("thermal yes &\n  temperature 20", "melting 60"), ("thermal no &\n ", "melting none"),
+         "'temperature'", "thermal yes"),
+    wall("wall_flux_without_thermal", ("thermal yes &\n  temperature 20", "melting 60", "temperature 50"),
+         ("thermal no &\n ", "melting none", "flux 50"), "'flux'", "thermal yes"),
     # ------------------------------------------------------------------------------------ fix mpm/traction, fix mpm/vtk
     Case("traction_unknown_id", "mpm/traction mpm", "mpm/traction nobody", "mpm/traction", ("nobody", "mpm/couple")),
     traction("traction_no_axis", "side + pressure 100", "'axis'", "missing"),
