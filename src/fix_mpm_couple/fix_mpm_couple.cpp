@@ -68,7 +68,7 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
   KeywordParser parser(
       lmp, this, narg, arg, 3,
       {"grid", "origin", "shape", "transfer", "order", "material", "thermal", "temperature", "mechanics",
-       "damping/point", "damping/grid", "point/size", "timestep/check", "leaving", "threads"});
+       "damping/point", "damping/grid", "point/size", "density/bulk", "timestep/check", "leaving", "threads"});
   while (parser.next()) {
     if (parser.is("grid")) scene_.spacing = parser.number(NumberRange::positive());
     else if (parser.is("origin"))
@@ -87,6 +87,7 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
     else if (parser.is("damping/grid")) scene_.grid_damping = parser.number(NumberRange::at_least(0.0));
     else if (parser.is("point/size"))
       for (int i = 0; i < domain->dimension; i++) size0_[i] = parser.number(NumberRange::positive());
+    else if (parser.is("density/bulk")) given_density_ = parser.number(NumberRange::positive());
     else if (parser.is("timestep/check")) check_time_step_ = parser.yes_no();
     else if (parser.is("leaving")) delete_leaving_ = parser.choice({"error", "delete"}) == 1;
     else if (parser.is("threads")) scene_.threads = parser.integer(1, 4096);
@@ -105,6 +106,8 @@ void FixMPMCouple::check_keywords(const KeywordParser &parser) {
     parser.require("temperature", "temperature T0, that of the points at the start, is needed with 'thermal yes'");
   if (!scene_.mechanical && !scene_.thermal)
     parser.fail("keyword 'mechanics': 'no' without 'thermal yes' leaves nothing to do");
+  if (given_density_ > 0.0 && rve_id_.empty())
+    parser.fail("keyword 'density/bulk' needs 'material rve'; with 'material elastic' use: set group GROUP density RHO");
   if (!parser.given("threads")) {
     const int share = rank_threads(world), wanted = omp_get_max_threads();
     scene_.threads = share < wanted ? share : wanted;
@@ -257,7 +260,7 @@ void FixMPMCouple::create_law(int type) {
   if (!rve_) fix_failed(lmp, this, "keyword 'material': fix " + rve_id_ + " of style mpm/rve does not exist any more");
   rve_->prepare(id, type, scene_.thermal);
   rve_law_as_mpm_law(rve_->law(), &law_);
-  bulk_density_ = rve_law_bulk_density(rve_->law());
+  bulk_density_ = given_density_ > 0.0 ? given_density_ : rve_law_bulk_density(rve_->law());
 }
 
 void FixMPMCouple::create_elastic_law(int type) {

@@ -25,7 +25,7 @@ namespace LAMMPS_NS {
  *       material rve RVEFIXID | material elastic 3d|plane_strain|plane_stress|bar
  *       [origin x y z] [order usf|usl|musl] [thermal yes|no] [temperature T0] [mechanics yes|no]
  *       [damping/point A] [damping/grid A] [point/size LX LY [LZ]] [timestep/check yes|no]
- *       [leaving error|delete] [threads N]
+ *       [leaving error|delete] [density/bulk RHO] [threads N]
  *   fix_modify ID damping/point A
  *   fix_modify ID damping/grid A             (from the next run on)
  *
@@ -35,7 +35,7 @@ namespace LAMMPS_NS {
  *
  * Size: `point/size`, else the spacing of the current lattice (sq, sc); in 2D the third edge is a metre of depth, so
  * that masses, forces and energies are per metre. Mass: volume times bulk density, which is that of the packings
- * (material rve) or the particles' own `density` (material elastic). The particle's rmass becomes the point's mass,
+ * (material rve; `density/bulk` replaces it, to scale inertia) or the particles' own `density` (material elastic). The particle's rmass becomes the point's mass,
  * its radius half the smallest edge.
  *
  * Points have numbers (f[30] of a particle): they count by position, z first, then y, then x, the same on any number of
@@ -127,7 +127,7 @@ class FixMPMCouple : public Fix {
   MpmScene scene_;
   std::string rve_id_; /* empty: elastic */
   MpmElasticMode elastic_mode_ = MPM_ELASTIC_3D;
-  double start_temperature_ = 0.0;
+  double start_temperature_ = 0.0, given_density_ = 0.0 /* 0: the packings' */;
   double size0_[3] = {};
   bool check_time_step_ = true, delete_leaving_ = false;
 
