@@ -36,7 +36,7 @@ def environment(threads=1):
 
 
 def execute(command, cwd=None, timeout=120, threads=1):
-    """Runs a command; returns (exit code, stdout + stderr). After `timeout` seconds ends its process group and fails."""
+    """Runs a command; returns (exit code, stdout + stderr). After `timeout` seconds it is ended and the test fails."""
     process = subprocess.Popen([str(word) for word in command], cwd=cwd, env=environment(threads), text=True,
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                errors="replace", start_new_session=True)
@@ -75,7 +75,7 @@ class Run:
 
 
 class Table(dict):
-    """Thermo columns by name. LIGGGHTS heads f_ID[i], c_ID and v_ID without the first two letters: both names find them."""
+    """Thermo columns by name. LIGGGHTS heads f_ID[i], c_ID, v_ID without the first two letters: both names find them."""
 
     def __missing__(self, name):
         if name[:2] in ("f_", "c_", "v_") and name[2:] in self:

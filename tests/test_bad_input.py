@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Every wrong script ends with an exit code, names the fix, what was given and what is allowed, and hangs on no rank."""
+"""Every wrong script ends with an exit code, names the fix, what was given and what is allowed; it hangs on no rank."""
 import pathlib
 import sys
 

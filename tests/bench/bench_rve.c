@@ -1,89 +1,101 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* One core, one RVE: isochoric biaxial shear of a packing, 2 % in 20,000 steps of 2e-6 s, kn = kt = 1e6 N/m, mu = 0.5.
- *
- *   bench_rve PACKING.txt [2|3] [steps per call] [steps] [skin]
- *
- * PACKING.txt: "Lx Ly Lz n", then n lines "x y z r", in metres. 2D grains are spheres in one layer; stresses are then
- * printed as force per length. */
+/* Particle-steps per second of the RVE engine: bench_rve [cpu|cuda] [seconds per case] */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "cuda_rve/rve.h"
+#include "cuda_rve/rve_packing.h"
 
-static int read_packing(const char *file, int dimension, RvePacking *packing) {
-  FILE *f = fopen(file, "r");
-  double l[3];
-  memset(packing, 0, sizeof *packing);
-  if (!f || fscanf(f, "%lf %lf %lf %d", &l[0], &l[1], &l[2], &packing->grains) != 4) return 0;
-  packing->dimension = dimension;
-  for (int k = 0; k < 3; k++) packing->cell[4 * k] = k < dimension ? l[k] : 1.0;
-  if (BASE_ALLOC(3 * (size_t)packing->grains, &packing->position) != BASE_OK) return 0;
-  if (BASE_ALLOC((size_t)packing->grains, &packing->radius) != BASE_OK) return 0;
-  for (int i = 0; i < packing->grains; i++) {
-    double x[3];
-    if (fscanf(f, "%lf %lf %lf %lf", &x[0], &x[1], &x[2], &packing->radius[i]) != 4) return 0;
-    for (int k = 0; k < dimension; k++) packing->position[3 * i + k] = x[k] / l[k] - 0.5;
-  }
-  fclose(f);
-  return 1;
-}
+typedef struct Case {
+  const char *name;
+  int dimension, copies[3], thermal, bonds;
+} Case;
 
-static int compare(const void *a, const void *b) {
-  const double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
+static const Case cases[] = {
+    {"200 disks, friction", 2, {20, 10, 1}, 0, 0},
+    {"200 disks, friction, heat", 2, {20, 10, 1}, 1, 0},
+    {"400 disks, friction, heat, bonds", 2, {20, 20, 1}, 1, 1},
+    {"216 spheres, friction, heat", 3, {6, 6, 6}, 1, 0},
+};
 
-int main(int argc, char **argv) {
-  const int dimension = argc > 2 ? atoi(argv[2]) : 2, per_call = argc > 3 ? atoi(argv[3]) : 1000;
-  const long steps = argc > 4 ? atol(argv[4]) : 20000;
-  RvePacking packing;
-  if (argc < 2 || !read_packing(argv[1], dimension, &packing)) {
-    fprintf(stderr, "usage: bench_rve PACKING.txt [2|3] [steps per call] [steps] [skin]\n");
-    return 2;
-  }
+static RveScene scene_of(const Case *c) {
   RveScene scene = rve_scene_default();
-  scene.dimension = dimension;
-  scene.grain = RVE_SPHERE;
-  scene.thickness = 1.0;
+  scene.dimension = c->dimension;
+  scene.grain = c->dimension == 2 ? RVE_DISK : RVE_SPHERE;
+  scene.thickness = 0.075;
   scene.density = 2650.0;
   scene.normal_stiffness = scene.tangential_stiffness = 1e6;
   scene.friction = 0.5;
-  scene.local_damping = 0.2;
-  scene.time_step = 2e-6;
-  scene.threads = 1;
-  scene.skin = argc > 5 ? atof(argv[5]) : 0.0;
-  RveInput input = {{0.0}, 0.0};
-  input.velocity_gradient[0] = -0.5;
-  input.velocity_gradient[4] = 0.5;
-  double seconds[3];
-  RveAnswer answer;
-  const char *name = "";
-  char text[32];
-  for (int round = 0; round < 3; round++) {
-    RveBatch *batch;
-    if (rve_batch_create(&scene, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch) != BASE_OK) {
-      fprintf(stderr, "%s\n", base_error_message());
-      return 1;
-    }
-    snprintf(text, sizeof text, "%s", rve_batch_backend_name(batch));
-    name = text;
-    const double start = base_seconds();
-    for (long k = 0; k < steps; k += per_call)
-      if (rve_batch_step(batch, 1, NULL, &input, per_call * scene.time_step, &answer) != BASE_OK) {
-        fprintf(stderr, "%s\n", base_error_message());
-        return 1;
-      }
-    seconds[round] = base_seconds() - start;
-    rve_batch_destroy(batch);
+  scene.critical_damping = 0.2;
+  scene.thermal = c->thermal;
+  scene.expansion = 1e-5;
+  scene.pipe_resistance = 1e3;
+  scene.bonds = c->bonds;
+  scene.bond_strength = 0.1;
+  scene.substeps = 200;
+  return scene;
+}
+
+/* A crystal whose grains are shaken a little: neighbours change under shear as in a random packing. */
+static BaseStatus packing_of(const Case *c, RvePacking *packing) {
+  RvePacking cell;
+  const double radius = 0.004;
+  TRY(rve_packing_lattice(c->dimension == 2 ? RVE_HEXAGONAL : RVE_SIMPLE_CUBIC, radius, 0.02, &cell));
+  const BaseStatus status = rve_packing_replicate(&cell, c->copies, packing);
+  rve_packing_destroy(&cell);
+  TRY(status);
+  uint64_t seed = 1;
+  for (int i = 0; i < packing->grains; i++) {
+    packing->radius[i] *= 0.95 + 0.1 * base_random(&seed);
+    for (int k = 0; k < c->dimension; k++)
+      packing->position[3 * i + k] += 0.05 * (base_random(&seed) - 0.5) / c->copies[k];
   }
-  qsort(seconds, 3, sizeof *seconds, compare);
-  printf("%s %dD %d grains: %.2f million particle-steps/s (median of 3; best %.2f), %d steps per call\n", name, dimension,
-         packing.grains, 1e-6 * (double)packing.grains * (double)answer.steps / seconds[1],
-         1e-6 * (double)packing.grains * (double)answer.steps / seconds[0], per_call);
-  printf("  sxx %.2f syy %.2f szz %.2f sxy %.3f (tension positive), Z %.3f, unbalanced %.2e, friction %.4e J, lists %lld\n",
-         answer.stress[0], answer.stress[1], answer.stress[2], answer.stress[3], answer.coordination, answer.unbalanced,
-         answer.friction_work, (long long)answer.rebuilds);
+  return BASE_OK;
+}
+
+/* Steps of a slow simple shear until the time is used up. */
+static BaseStatus measure(RveBatch *batch, int count, double dt, double seconds, double *steps_per_second) {
+  RveInput *input = calloc((size_t)count, sizeof *input);
+  RveAnswer *answer = calloc((size_t)count, sizeof *answer);
+  BaseStatus status = input && answer ? BASE_OK : base_error(BASE_ERROR_MEMORY, "no memory");
+  for (int k = 0; status == BASE_OK && k < count; k++) input[k].velocity_gradient[1] = 0.5, input[k].temperature = 1.0;
+  if (status == BASE_OK) status = rve_batch_step(batch, count, NULL, input, dt, answer); /* warm */
+  const double start = base_seconds();
+  int64_t calls = 0;
+  while (status == BASE_OK && base_seconds() - start < seconds) {
+    status = rve_batch_step(batch, count, NULL, input, dt, answer);
+    calls++;
+  }
+  *steps_per_second = (double)calls * rve_batch_scene(batch)->substeps * count / (base_seconds() - start);
+  free(input);
+  free(answer);
+  return status;
+}
+
+static BaseStatus run(const Case *c, RveBackend backend, double seconds) {
+  const RveScene scene = scene_of(c);
+  const int count = backend == RVE_BACKEND_CUDA ? 1600 : 64;
+  RvePacking packing = {0};
+  RveBatch *batch = NULL;
+  double rate = 0.0;
+  BaseStatus status = packing_of(c, &packing);
+  if (status == BASE_OK) status = rve_batch_create(&scene, &packing, 1, NULL, count, backend, &batch);
+  if (status == BASE_OK && scene.bonds) status = rve_batch_install_bonds(batch, 0, NULL);
+  if (status == BASE_OK) status = measure(batch, count, 200 * 0.25 * rve_critical_time_step(&scene, &packing), seconds, &rate);
+  if (status == BASE_OK)
+    printf("%-36s %5d RVEs  %-11s %.3g particle-steps/s\n", c->name, count, rve_batch_backend_name(batch),
+           rate * packing.grains);
+  else printf("%-36s %s\n", c->name, base_error_message());
+  rve_batch_destroy(batch);
   rve_packing_destroy(&packing);
-  return 0;
+  return status;
+}
+
+int main(int argc, char **argv) {
+  const RveBackend backend = argc > 1 && strcmp(argv[1], "cuda") == 0 ? RVE_BACKEND_CUDA : RVE_BACKEND_CPU;
+  const double seconds = argc > 2 ? atof(argv[2]) : 3.0;
+  int failed = 0;
+  for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) failed |= run(&cases[k], backend, seconds) != BASE_OK;
+  return failed;
 }
