@@ -12,9 +12,14 @@ extern "C" {
 /* Reads a periodic packing; the kind is recognised by content: a LIGGGHTS data file (atom_style granular/sphere,
  * write_data or read_data form, also triclinic), the last frame of a text dump (dump custom with columns id x y [z] radius,
  * box bounds pp, ITEM: BOX BOUNDS also xy xz yz), a LIGGGHTS binary restart, or rve_packing_write()'s own text form (which keeps
- * the tangential history). dimension: 2 drops z (all grains in one layer); 3 keeps it.
+ * the tangential history). dimension: 2 drops z (all grains in one layer); 3 keeps it. Grains are sorted by id. Velocities and
+ * spins of the file are taken as they are, less the mean velocity. A data file does not tell its boundaries: taken as periodic.
  * BASE_ERROR_FILE / BASE_ERROR_FORMAT with file, line and reason; never crashes on any bytes (fuzzed). */
 BaseStatus rve_packing_read(const char *file, int dimension, RvePacking *packing);
+/* As rve_packing_read; also makes the tangential displacements that a LIGGGHTS restart of `model hooke/stiffness tangential
+ * history` holds into forces of this stiffness (kt, N/m; the file does not tell it). With 0, and with data files and dumps, which
+ * have no history, contacts start without tangential force. */
+BaseStatus rve_packing_read_history(const char *file, int dimension, double tangential_stiffness, RvePacking *packing);
 /* Writes through a temporary name, fsync and rename; text with 17 digits. */
 BaseStatus rve_packing_write(const char *file, const RvePacking *packing);
 
