@@ -197,6 +197,7 @@ RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call
   for (int k = 0; k < RVE_SUMS; k++) total.all[k] = rve_team_sum(team, sum.all[k]);
   if (team->leader) {
     RveAnswer fresh;
+    memset(&fresh, 0, sizeof fresh); /* also its padding: answers are compared and stored as bytes */
     rve_fill_answer(ft, call, head, n, &total, work_before, duration, &fresh);
     if (rve_answer_is_finite(&fresh)) *answer = fresh;
     else head->failed = BASE_ERROR_UNSTABLE, answer->status = BASE_ERROR_UNSTABLE;

@@ -482,7 +482,7 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   head->stretch = 1.0;
   head->rebuilds++;
   head->steps_at_list = head->steps;
-  head->list_due = 0;
+  head->list_due = RVE_LIST_GOOD;
   head->need_pairs = head->need_slot_rows = head->need_incoming_rows = 0;
   return RVE_LIST_BUILT;
 }

@@ -46,6 +46,9 @@ BaseStatus rve_record_pack(const RveRecord *record, uint64_t scene_hash, void *b
   header.payload_bytes = record->bytes;
   header.counts = record->counts;
   header.last = record->last;
+  /* The gap behind the last field is no state: the bytes must not depend on what the stack held. */
+  const size_t end = offsetof(RveAnswer, status) + sizeof header.last.status;
+  memset((char *)&header.last + end, 0, sizeof header.last - end);
   header.checksum = checksum_of(&header, record->arena);
   memcpy(bytes, &header, sizeof header);
   memcpy((char *)bytes + sizeof header, record->arena, record->bytes);
@@ -101,8 +104,7 @@ static BaseStatus convert(const RveKernels *kernels, const RveRecord *from, RveR
   if (rows > n.slot_rows) n.slot_rows = rows;
   TRY_GOTO(rve_record_alloc(&n, to), status, done);
   *rve_head(to->arena) = *rve_head(from->arena);
-  rve_head(to->arena)->list_due = 1;
-  rve_head(to->arena)->reach = 1e300; /* spent, whatever the grains did */
+  rve_head(to->arena)->list_due = RVE_LIST_ABSENT;
   to->last = from->last;
   for (int i = 0; i < n.blocks * n.lanes; i++) b->id[i] = -1;
   for (int q = 0; q < n.grains; q++) {

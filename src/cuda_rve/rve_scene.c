@@ -128,6 +128,23 @@ static void call_material(const RveScene *scene, RveCall *call) {
   call->thickness = scene->dimension == 2 ? scene->thickness : 1.0;
 }
 
+/* exp(factor a) - 1. Small ones by their own series: adding the unit first would round away what thousands of steps add up. */
+static void exponential_minus_one(const double a[9], double factor, double e[9]) {
+  double norm = 0.0, scaled[9], term[9], product[9];
+  for (int k = 0; k < 9; k++) norm = fmax(norm, fabs(scaled[k] = a[k] * factor));
+  if (norm > 0.05) {
+    tensor_exponential(a, factor, e);
+    for (int k = 0; k < 9; k += 4) e[k] -= 1.0;
+    return;
+  }
+  memcpy(e, scaled, sizeof scaled);
+  memcpy(term, scaled, sizeof scaled);
+  for (int order = 2; order <= 10; order++) {
+    tensor_multiply(term, scaled, product);
+    for (int k = 0; k < 9; k++) term[k] = product[k] / order, e[k] += term[k];
+  }
+}
+
 /* L per DEM step, its exponential, and its symmetric and rotating parts. */
 static void call_deformation(const RveScene *scene, const double gradient[9], double factor, RveCall *call) {
   double spin[9], norm = 0.0;
@@ -144,7 +161,7 @@ static void call_deformation(const RveScene *scene, const double gradient[9], do
       norm += call->rate[3 * i + j] * call->rate[3 * i + j];
       call->turning |= scene->dimension == 3 && spin[3 * i + j] != 0.0;
     }
-  tensor_exponential(call->gradient, call->dt, call->step_map);
+  exponential_minus_one(call->gradient, call->dt, call->step_map);
   tensor_exponential(spin, call->dt, call->turn);
   call->shorten = exp(sqrt(norm) * call->dt);
 }
@@ -168,5 +185,6 @@ BaseStatus rve_call_make(const RveScene *scene, const RveHead *head, const RveIn
     call->dt = duration / (double)call->steps;
   }
   call_deformation(scene, input->velocity_gradient, factor, call);
+  if (call->steps == 0) memcpy(call->rate, head->rate, sizeof call->rate);
   return BASE_OK;
 }

@@ -114,7 +114,7 @@ BaseStatus rve_record_from_packing(const RveKernels *kernels, const RveScene *sc
   tensor_inverse(head.cell, head.inverse);
   head.temperature = scene->thermal ? scene->reference_temperature : 0.0;
   head.scale = head.scale_at_list = head.stretch = 1.0;
-  head.list_due = 1;
+  head.list_due = RVE_LIST_ABSENT;
   head.critical_time_step = rve_critical_time_step(scene, packing);
   BaseStatus status;
   int rows = 0;
@@ -190,6 +190,7 @@ void rve_record_rest(RveRecord *record) {
   const RveCounts *n = &record->counts;
   const RveArrays *a = &record->arrays;
   const size_t bytes = (size_t)n->blocks * (size_t)n->lanes * 8;
+  memset(rve_head(record->arena)->rate, 0, sizeof rve_head(record->arena)->rate);
   for (int k = 0; k < n->dimension; k++) memset(a->velocity[k], 0, bytes);
   for (int k = 0; k < (n->dimension == 2 ? 1 : 3); k++) memset(a->spin[k], 0, bytes);
 }

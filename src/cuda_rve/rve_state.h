@@ -23,6 +23,8 @@ enum {
   RVE_IMAGE_VOID = 1 << 13       /* empty slot */
 };
 
+enum { RVE_LIST_GOOD, RVE_LIST_CHECK /* its running bound is spent */, RVE_LIST_ABSENT /* must be built */ };
+
 typedef struct RveCounts {
   int32_t dimension, grains, lanes, blocks;
   int32_t slot_rows, incoming_rows; /* capacity, in rows of `lanes` */
@@ -34,6 +36,7 @@ typedef struct RveCounts {
 typedef struct RveHead {
   double cell[9], inverse[9];       /* H, m, and its inverse, 1/m */
   double cell_at_list[9];
+  double rate[9];                   /* D of the last step, 1/s: the present forces of dashpots depend on it */
   double temperature, scale;        /* radius = scale * reference radius */
   double scale_at_list;
   double reach;                     /* m: no grain's fluctuation has moved further since the list was built */
@@ -44,7 +47,7 @@ typedef struct RveHead {
   double critical_time_step;        /* s */
   int64_t steps, rebuilds, steps_at_list;
   int64_t done;                     /* steps of the present call; not 0 only while waiting for a larger arena */
-  int32_t list_due;                 /* 1: the list must be checked (and perhaps built) before the next contact pass */
+  int32_t list_due;                 /* RVE_LIST_*: what must happen before the next contact pass */
   int32_t failed;                   /* BASE_ERROR_UNSTABLE after the watchdog spoke, for ever */
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
@@ -75,7 +78,7 @@ typedef struct RveCall {
   int64_t steps;
   double dt;
   double gradient[9], rate[9]; /* L of the DEM step and its symmetric part, 1/s */
-  double step_map[9];          /* exp(L dt) */
+  double step_map[9];          /* exp(L dt) - 1 */
   double turn[9];              /* exp(W dt): rotates the 3D tangential history */
   double shorten;              /* exp(|D| dt) */
   int32_t moving, turning;     /* L != 0; W != 0 in 3D */

@@ -17,8 +17,8 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
     double h[9];
     for (int i = 0; i < 3; i++)
       for (int j = 0; j < 3; j++)
-        h[3 * i + j] = call->step_map[3 * i] * head->cell[j] + call->step_map[3 * i + 1] * head->cell[3 + j] +
-                       call->step_map[3 * i + 2] * head->cell[6 + j];
+        h[3 * i + j] = head->cell[3 * i + j] + (call->step_map[3 * i] * head->cell[j] + call->step_map[3 * i + 1] * head->cell[3 + j] +
+                                                call->step_map[3 * i + 2] * head->cell[6 + j]);
     for (int k = 0; k < 9; k++) head->cell[k] = h[k];
     rve_invert(h, head->inverse);
     head->stretch /= call->shorten;
@@ -28,7 +28,7 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
   head->scale = rve_radius_factor(call, temperature);
   head->steps++;
   head->done++;
-  head->list_due = rve_list_is_spent(head);
+  head->list_due = rve_list_is_spent(head) ? RVE_LIST_CHECK : RVE_LIST_GOOD;
   /* A grain that crosses half a small grain in one step is out of control, whatever the scene. NaN fails the test too. */
   if (!(sqrt(fastest) * call->dt <= 0.5 * head->radius_min * head->scale)) head->failed = BASE_ERROR_UNSTABLE;
 }
@@ -48,12 +48,12 @@ RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCount
 /* Looks whether the list is really spent (the running bound is a sum of maxima); if so, builds the next. */
 RVE_FN RveOutcome rve_renew_list(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
                                  const RveArrays *a, RveScratch *s) {
-  if (head->rebuilds > 0 && head->need_pairs == 0) {
+  if (head->list_due == RVE_LIST_CHECK && head->need_pairs == 0) {
     const double farthest = rve_farthest(ft.dimension, team, head, n, a);
     if (team->leader) {
       head->stretch = rve_least_stretch(head);
       head->reach = farthest * (1.0 + 1e-9);
-      if (2.0 * head->reach <= 0.85 * rve_room(head)) head->list_due = 0;
+      if (2.0 * head->reach <= 0.85 * rve_room(head)) head->list_due = RVE_LIST_GOOD;
     }
     rve_sync();
     if (!head->list_due) return RVE_DONE;
@@ -104,6 +104,7 @@ RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *ca
   const double kt = call->tangential_stiffness;
   const double slid = rve_team_sum(team, slip), dashed = rve_team_sum(team, dash), damped = rve_team_sum(team, damping);
   if (team->leader) {
+    for (int k = 0; k < 9; k++) head->rate[k] = call->rate[k];
     head->friction_work += kt > 0.0 ? slid / kt : 0.0;
     head->damping_work += dashed * call->dt + damped;
     if (outcome == RVE_DONE) head->done = 0;

@@ -3,6 +3,9 @@
 #ifndef DEMPM_RVE_HELP_H
 #define DEMPM_RVE_HELP_H
 
+#if !defined(_POSIX_C_SOURCE)
+#define _POSIX_C_SOURCE 200809L /* setenv */
+#endif
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
