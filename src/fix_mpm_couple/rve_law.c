@@ -173,7 +173,7 @@ BaseStatus rve_law_set_volumes(RveLaw *law, int n, const int64_t *tags, const do
 static void pack_input(const MpmLawBatch *batch, double *value) {
   for (int p = 0; p < batch->n; p++) {
     memcpy(value + (size_t)p * INPUT_WIDTH, batch->velocity_gradient + 9 * (size_t)p, 9 * sizeof *value);
-    value[(size_t)p * INPUT_WIDTH + 9] = batch->temperature[p];
+    value[(size_t)p * INPUT_WIDTH + 9] = batch->temperature ? batch->temperature[p] : 0.0;
   }
 }
 
@@ -195,9 +195,9 @@ static void pack_answer(const RveStoreItem *item, double *value) {
 static void unpack_answers(const double *value, MpmLawBatch *batch) {
   for (int p = 0; p < batch->n; p++, value += OUTPUT_WIDTH) {
     memcpy(batch->stress + 6 * (size_t)p, value + OUT_STRESS, 6 * sizeof *value);
-    memcpy(batch->conductivity + 6 * (size_t)p, value + OUT_CONDUCTIVITY, 6 * sizeof *value);
+    if (batch->conductivity) memcpy(batch->conductivity + 6 * (size_t)p, value + OUT_CONDUCTIVITY, 6 * sizeof *value);
     memcpy(batch->scalars + MPM_LAW_SCALARS * (size_t)p, value + OUT_SCALARS, MPM_LAW_SCALARS * sizeof *value);
-    batch->heat[p] = value[OUT_HEAT];
+    if (batch->heat) batch->heat[p] = value[OUT_HEAT];
     batch->modulus[p] = value[OUT_MODULUS];
   }
 }

@@ -20,7 +20,7 @@ typedef struct MpmLawBatch {
   const int64_t *tag;                 /* [n] the points' global identities */
   const double *velocity_gradient;    /* [n][9] 1/s, row-major */
   const double *deformation_gradient; /* [n][9] F before this step's increment */
-  const double *temperature;          /* [n] at the end of the step */
+  const double *temperature;          /* [n] at the end of the step; NULL without heat, as are the next and heat, conductivity */
   const double *temperature_rate;     /* [n] 1/s */
   double *stress;                     /* [n][6] Cauchy, Pa, tension positive; in: before, out: after the step */
   double *heat;                       /* [n] W/m3 of current volume */
