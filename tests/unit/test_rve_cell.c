@@ -298,9 +298,9 @@ static void reduction_keeps_stress_and_histories(void **state) {
       const RveAnswer answer = help_step(batch, gradient, 0.0, 0.05);
       RvePacking skewed;
       MUST(rve_batch_packing(batch, 0, &skewed));
-      skew(stage % dim, (stage + 1) % dim, 1 + stage % (5 - dim), &skewed);
+      skew(stage % dim, (stage + 1) % dim, 1 + stage % (4 - dim), &skewed);
       wrap(&skewed);
-      if (dim == 2 && (stage & 1)) skew((stage + 1) % dim, stage % dim, -2, &skewed), wrap(&skewed);
+      if (dim == 2 && (stage & 1)) skew((stage + 1) % dim, stage % dim, -1, &skewed), wrap(&skewed);
       RveBatch *other = help_batch(&scene, &skewed);
       const RveAnswer again = help_step(other, NULL, 0.0, 0.0);
       error = fmax(error, help_difference(6, again.stress, answer.stress));
