@@ -64,15 +64,22 @@ def read_vtk(path):
 class Frame:
     """The points of one moment."""
 
-    def __init__(self, path, step, time, fix):
+    def __init__(self, path, step, time, run):
         self.step, self.time = step, time
         self.position, arrays = read_vtk(path)
         self.velocity = arrays.get("v")
         self.columns = {}
         for name, values in arrays.items():
-            match = re.fullmatch(r"f_(\w+)\[(\d+)\]", name)
-            if match and fix in (None, match[1]):
-                self.columns[int(match[2])] = values
+            match = re.fullmatch(r"f_(\w+)\[(\d+)(?:-(\d+))?\]", name)
+            if not match or run.options.fix not in (None, match[1]):
+                continue
+            first, last = int(match[2]), match[3]
+            if last is None:
+                self.columns[first] = values
+                continue
+            # dump custom/vtk writes three successive columns as one vector, named after the first and the last of them.
+            for column, part in zip((first, run.middle_column(match[1], first, int(last)), int(last)), values.T):
+                self.columns[column] = part
 
     def field(self, name):
         if name == "speed":
@@ -116,11 +123,17 @@ class Run:
         found = re.findall(r"^\s*timestep\s+([0-9.eE+-]+)\s*$", self.log, re.MULTILINE)
         return float(found[-1]) if found else None
 
+    def middle_column(self, fix, first, last):
+        """The column that the dump command in the log names between two others; None if there is no such log."""
+        triple = rf"f_{fix}\[{first}\]\s+f_{fix}\[(\d+)\]\s+f_{fix}\[{last}\]"
+        found = re.search(rf"^\s*dump\s.*custom/vtk\s.*{triple}", self.log, re.MULTILINE)
+        return int(found[1]) if found else first + 1 if last == first + 2 else None
+
     def frame(self, k):
         step, path = self.files[k]
         if k not in self.cache:
             time = step * self.timestep if self.timestep else None
-            self.cache[k] = Frame(path, step, time, self.options.fix)
+            self.cache[k] = Frame(path, step, time, self)
         return self.cache[k]
 
     def spacing(self):

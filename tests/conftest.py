@@ -75,7 +75,7 @@ class Run:
 
 
 class Table(dict):
-    """Thermo columns by name. LIGGGHTS heads f_ID[i], c_ID, v_ID without the first two letters: both names find them."""
+    """Thermo columns by name. LIGGGHTS heads f_ID[i], c_ID, v_ID without the first two letters: both are found."""
 
     def __missing__(self, name):
         if name[:2] in ("f_", "c_", "v_") and name[2:] in self:
