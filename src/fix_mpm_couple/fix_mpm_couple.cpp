@@ -156,6 +156,13 @@ void FixMPMCouple::exclude_from_neighbor_lists() {
   neighbor->modify_params(4, words);
 }
 
+FixMPMCouple *FixMPMCouple::find(LAMMPS *lammps, const Fix *asking, const std::string &mpm_id) {
+  const int k = lammps->modify->find_fix(mpm_id.c_str());
+  FixMPMCouple *couple = k < 0 ? NULL : dynamic_cast<FixMPMCouple *>(lammps->modify->fix[k]);
+  if (!couple) fix_failed(lammps, asking, "'" + mpm_id + "' is not the id of a fix mpm/couple");
+  return couple;
+}
+
 int FixMPMCouple::modify_param(int narg, char **arg) {
   KeywordParser parser(lmp, this, narg, arg, 0, {"damping/point", "damping/grid"});
   while (parser.next()) {

@@ -35,6 +35,7 @@ FixMPMRve::FixMPMRve(LAMMPS *lammps, int narg, char **arg)
       rest_pending_(false) {
   restart_global = 1;
   scene_.dimension = domain->dimension;
+  scene_.reference_temperature = NAN; /* asked for when heat flows */
   read_keywords(narg, arg);
 }
 
@@ -148,6 +149,17 @@ void FixMPMRve::read_properties(RveScene &scene, int type, bool thermal) const {
                "packing hold is needed");
 }
 
+void FixMPMRve::check_dem_time_step(const RveScene &scene) const {
+  for (const RvePacking &packing : packings_) {
+    const double critical = rve_critical_time_step(&scene, &packing);
+    if (scene.time_step > critical)
+      fix_failed(lmp, this,
+                 format_text("keyword 'timestep/dem': '%g' is given, allowed is a number > 0 and <= %g, the critical "
+                             "time step of packing %d",
+                             scene.time_step, critical, (int)(&packing - packings_.data()) + 1));
+  }
+}
+
 void FixMPMRve::prepare(const char *user, int type, bool thermal) {
   if (!user_.empty() && user_ != user)
     fix_failed(lmp, this, "serves fix " + user_ + " already; fix " + user + " needs a fix mpm/rve of its own");
@@ -155,6 +167,7 @@ void FixMPMRve::prepare(const char *user, int type, bool thermal) {
   RveScene scene = scene_;
   read_properties(scene, type, thermal);
   fix_check(lmp, this, rve_scene_check(&scene));
+  check_dem_time_step(scene);
   if (law_) {
     fix_check(lmp, this, rve_law_set_scene(law_, &scene));
     return;

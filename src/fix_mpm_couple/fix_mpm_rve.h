@@ -69,6 +69,7 @@ class FixMPMRve : public Fix {
   void read_bonds(class KeywordParser &);
   void read_packings(const std::vector<std::string> &files);
   void read_properties(RveScene &scene, int type, bool thermal) const;
+  void check_dem_time_step(const RveScene &scene) const;
   void carry_out_pending();
 };
 

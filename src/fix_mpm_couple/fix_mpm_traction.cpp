@@ -2,6 +2,7 @@
 #include "fix_mpm_traction.h"
 
 #include "domain.h"
+#include "fix_mpm_couple.h"
 #include "keyword_parser.h"
 #include "rank_error.h"
 
@@ -28,3 +29,5 @@ FixMPMTraction::FixMPMTraction(LAMMPS *lammps, int narg, char **arg) : Fix(lammp
   if (parser.given("pressure")) traction_.traction[traction_.axis] = -pressure * traction_.side;
   if (domain->dimension == 2 && traction_.traction[2] != 0.0) parser.fail("keyword 'traction': tz must be 0 in 2D");
 }
+
+void FixMPMTraction::init() { FixMPMCouple::find(lmp, this, mpm_id_); }

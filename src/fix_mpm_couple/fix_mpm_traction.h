@@ -26,6 +26,7 @@ class FixMPMTraction : public Fix {
  public:
   FixMPMTraction(class LAMMPS *, int, char **);
   int setmask() { return 0; }
+  void init();
   const std::string &mpm_id() const { return mpm_id_; }
   const MpmTraction &traction() const { return traction_; }
 

@@ -8,7 +8,6 @@
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
 #include "keyword_parser.h"
-#include "modify.h"
 #include "rank_error.h"
 #include "update.h"
 #include "vtk_writer.h"
@@ -35,11 +34,7 @@ FixMPMVtk::FixMPMVtk(LAMMPS *lammps, int narg, char **arg) : Fix(lammps, narg, a
 
 int FixMPMVtk::setmask() { return END_OF_STEP; }
 
-void FixMPMVtk::init() {
-  const int k = modify->find_fix(mpm_id_.c_str());
-  mpm_ = k < 0 ? NULL : dynamic_cast<FixMPMCouple *>(modify->fix[k]);
-  if (!mpm_) fix_failed(lmp, this, "'" + mpm_id_ + "' is not the id of a fix mpm/couple");
-}
+void FixMPMVtk::init() { mpm_ = FixMPMCouple::find(lmp, this, mpm_id_); }
 
 void FixMPMVtk::setup(int) {
   if (!tags_.empty() && !mpm_->rve())

@@ -6,6 +6,7 @@
 
 #include "comm.h"
 #include "domain.h"
+#include "fix_mpm_couple.h"
 #include "keyword_parser.h"
 #include "rank_error.h"
 
@@ -64,6 +65,8 @@ FixMPMWall::FixMPMWall(LAMMPS *lammps, int narg, char **arg)
   if (parser.given("nocontact") && wall_.heat == MPM_WALL_ADIABATIC)
     parser.fail("keyword 'nocontact' without 'temperature' or 'flux': the wall would do nothing");
 }
+
+void FixMPMWall::init() { FixMPMCouple::find(lmp, this, mpm_id_); }
 
 void FixMPMWall::read_shape(KeywordParser &parser) {
   if (parser.is("box")) {

@@ -42,6 +42,7 @@ class FixMPMWall : public Fix {
  public:
   FixMPMWall(class LAMMPS *, int, char **);
   int setmask() { return 0; }
+  void init();
   double compute_vector(int);
   void write_restart(FILE *);
   void restart(char *);
