@@ -91,7 +91,18 @@ void FixMPMCouple::start_point(int i) {
 void FixMPMCouple::assign_rves() {
   if (!rve_) return;
   std::vector<int64_t> tags;
-  for (const MpmPoint &point : points_) tags.push_back(point.tag);
+  int mine = 0, any;
+  for (size_t k = 0; k < points_.size(); k++) {
+    tags.push_back(points_[k].tag);
+    if (state_[particle_[k]][STATE_STAGE] == STAGE_ANSWERED) mine = 1;
+  }
+  MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
+  if (any && !rve_->has_state())
+    fix_failed(lmp, this, "the points have run before, but fix " + rve_id_ +
+                              " has no RVEs of theirs: it is new, or had another id or style in the restart file");
+  if (!any && rve_->has_state())
+    fix_failed(lmp, this, "the points are new, but fix " + rve_id_ +
+                              " has RVEs of other points: this fix had another id or style in the restart file");
   rve_->assign(tags);
 }
 

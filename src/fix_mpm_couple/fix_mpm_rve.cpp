@@ -177,7 +177,9 @@ void FixMPMRve::prepare(const char *user, int type, bool thermal) {
     fix_check(lmp, this, rve_law_unpack(law_, restart_state_.data(), restart_state_.size()));
     restart_state_.clear();
     restart_state_.shrink_to_fit();
-    assigned_ = true;
+    RveLawTotals totals; /* none if the restart file was written before the first run */
+    fix_check(lmp, this, rve_law_totals(law_, &totals));
+    assigned_ = totals.rves > 0;
   }
 }
 

@@ -51,6 +51,7 @@ class FixMPMRve : public Fix {
   /* Gives RVEs to the points that have none; collective. Then does what fix_modify asked for before there were RVEs. */
   void assign(const std::vector<int64_t> &tags);
   RveLaw *law() const { return law_; }
+  bool has_state() const { return assigned_; } /* there are RVEs: this run's or a restart file's */
   bool has_bonds() const { return scene_.bonds != 0; }
 
  private:

@@ -100,6 +100,28 @@ def test_bonds_are_installed_when_the_script_says_so(dempm, tmp_path):
     assert fractions[0] == {0.0} and min(fractions[1]) > 0.5
 
 
+def test_restart_before_any_run_is_the_start(dempm, tmp_path):
+    script = first(False, "write_restart begin\nrun 100\n")
+    expected = state(dempm(script, files={"grains.data": packing()}, cwd=tmp_path), 100)
+    (tmp_path / "state.100.txt").unlink()
+    again = dempm(HEAD + "read_restart begin\n" + material(False) + state_dump(100) + "run 100\n", cwd=tmp_path)
+    assert state(again, 100) == expected
+
+
+@pytest.mark.parametrize("new, message", [("fix rve2 all mpm/rve", "has no RVEs of theirs"),
+                                          ("fix mpm2 all mpm/couple", "has RVEs of other points")])
+def test_restart_with_another_id_is_refused(new, message, dempm, tmp_path):
+    """Points and RVEs belong together: neither may silently start anew."""
+    dempm(first(False, "run 10\nwrite_restart half\n"), files={"grains.data": packing()}, cwd=tmp_path)
+    script = HEAD + "read_restart half\n" + material(False) + "run 1\n"
+    old, name = new.replace("2 ", " "), new.split()[1]
+    script = script.replace(old, new).replace("material rve rve", "material rve " + ("rve2" if name == "rve2" else "rve"))
+    if name == "mpm2":
+        script = script.replace("mpm/wall mpm ", "mpm/wall mpm2 ").replace("f_mpm", "f_mpm2")
+    run = dempm(script, cwd=tmp_path, check=False)
+    assert run.code != 0 and message in run.output
+
+
 def test_altered_restart_file_is_refused(dempm, tmp_path):
     files = {"grains.data": packing()}
     dempm(first(False, "run 10\nwrite_restart half\n"), files=files, cwd=tmp_path)
