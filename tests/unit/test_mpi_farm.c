@@ -194,10 +194,12 @@ static void answers_are_those_of_one_serial_batch_while_points_migrate(void **st
   int alive[TAGS];
   Truth truth;
   RveLaw *law;
+  RveScene threaded = scene;
+  threaded.threads = 2;
   all_alive(alive);
   CHECK_ALL(truth_create(&scene, &truth) == BASE_OK);
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, RVE_BACKEND_CPU, &law) == BASE_OK);
-  CHECK_ALL(assign_alive(law, alive) == BASE_OK);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &threaded, packing, PACKINGS, RVE_BACKEND_CPU, &law) == BASE_OK);
+  CHECK_ALL(rve_law_threads(law) == 2 && assign_alive(law, alive) == BASE_OK);
   for (int step = 0; step < 10; step++) {
     const double dt = step % 4 == 0 ? 0.0 : time_step; /* 0: the present state is asked */
     CHECK_ALL(truth_step(&truth, alive, step, dt, expected) == BASE_OK);
