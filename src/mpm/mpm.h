@@ -32,7 +32,7 @@ typedef struct MpmScene {
   double grid_damping;    /* alpha_g, 1/s */
   int thermal;            /* 1: heat is transported */
   int mechanical;         /* 1 (default); 0: thermal only, points do not move */
-  double mass_cutoff;     /* nodes below this fraction of the largest point mass move with the points' field but carry no force; default 1e-12 */
+  double mass_cutoff;     /* nodes below this fraction of their largest point's mass move with the points' field but carry no force; default 1e-30 */
   int threads;            /* 0 = OpenMP's own choice */
 } MpmScene;
 MpmScene mpm_scene_default(void);
@@ -89,7 +89,8 @@ typedef struct MpmWall {
 MpmWall mpm_wall_default(void);
 BaseStatus mpm_wall_check(const MpmWall *wall, int dimension, int thermal);
 
-/* Traction on the current outermost layer of points along +axis or -axis (errata A.6): each gets t V_p / h. */
+/* Traction on the current outermost layer of points along +axis or -axis (errata A.6): each gets t V_p / h, h its own width. The component
+ * along the axis acts along the current normal of the point's face, as a pressure does. */
 typedef struct MpmTraction {
   int axis;            /* 0, 1, 2 */
   int side;            /* +1 or -1: which outermost layer */

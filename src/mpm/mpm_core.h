@@ -159,7 +159,8 @@ void mpm_wall_start(Mpm *mpm);            /* kinematic condition on the nodal ve
 void mpm_wall_update(Mpm *mpm);           /* impulses on the updated velocity; the walls' outputs */
 double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], double normal[3]);
 int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]);
-double mpm_face_area(const MpmPoint *point, const double normal[3]);
+/* The face of the point's deformed domain that looks most along the normal: area vector, m2, and its projection on the normal. */
+double mpm_face_area(const MpmPoint *point, const double normal[3], double area[3]);
 
 /* mpm_traction.c */
 void mpm_traction_add(Mpm *mpm, const MpmPoint *points, MpmVec *load);

@@ -39,10 +39,10 @@ void mpm_heat_walls(Mpm *mpm, const MpmPoint *points, MpmVec *load) {
     if (wall->heat != MPM_WALL_FLUX) continue;
     for (int p = 0; p < mpm->points.own; p++) {
       const MpmPoint *point = &points[p];
-      double normal[3];
+      double normal[3], vector[3];
       if (!mpm_wall_in_range(wall, dimension, point->position)) continue;
       const double distance = mpm_wall_distance(wall, dimension, point->position, normal);
-      const double area = mpm_face_area(point, normal);
+      const double area = mpm_face_area(point, normal, vector);
       const double layer = point->volume0 * tensor_determinant(point->deformation_gradient) / area;
       if (!(distance <= layer)) continue;
       load[(size_t)p * (size_t)width][0] += wall->flux * area;

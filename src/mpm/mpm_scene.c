@@ -11,7 +11,7 @@ MpmScene mpm_scene_default(void) {
                     .xpic_order = 2,
                     .order = MPM_ORDER_USF,
                     .mechanical = 1,
-                    .mass_cutoff = 1e-12};
+                    .mass_cutoff = 1e-30};
 }
 
 static BaseStatus check_number(const char *entry, double value, double low, double high) {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Traction on the outermost layer of points (errata A.6): a point belongs to it if no other point lies beyond it, seen along the axis within
- * half a point's width to the sides. The force is the traction times the point's face, V / h with h the point's own width. */
+ * half a point's width to the sides. Its face has the area V / h, h being the point's own width. The normal component of the traction acts
+ * along the face's current normal, as a pressure does (a force of fixed direction would turn a body that is free to turn); the
+ * tangential components act along their axes. */
 #include <math.h>
 
 #include "../base/tensor.h"
@@ -62,14 +64,19 @@ static void add_one(Mpm *mpm, const MpmTraction *traction, const MpmPoint *point
     if (slot >= sorted->own) continue;
     const MpmPoint *point = &points[slot];
     const double volume = point->volume0 * tensor_determinant(point->deformation_gradient);
-    double half_width[3], area = 0.0;
+    double half_width[3], area = 0.0, vector[3] = {0.0, 0.0, 0.0}, unused[3];
     for (int i = 0; i < dimension; i++) {
-      const double normal[3] = {i == 0, i == 1, i == 2}, face = mpm_face_area(point, normal);
+      const int is_axis = i == traction->axis;
+      const double normal[3] = {i == 0, i == 1, i == 2}, face = mpm_face_area(point, normal, is_axis ? vector : unused);
       half_width[i] = 0.5 * volume / face * mpm->inverse_spacing;
-      if (i == traction->axis) area = face;
+      if (is_axis) area = face;
     }
     if (!is_outermost(mpm, sorted->item[k].cell, sorted->place[k], traction, half_width)) continue;
-    for (int i = 0; i < dimension; i++) load[(size_t)slot * (size_t)width][1 + i] += traction->traction[i] * area;
+    MpmVec *force = &load[(size_t)slot * (size_t)width];
+    for (int i = 0; i < dimension; i++) {
+      if (i != traction->axis) (*force)[1 + i] += traction->traction[i] * area;
+      (*force)[1 + i] += traction->traction[traction->axis] * vector[i];
+    }
   }
 }
 

@@ -46,17 +46,21 @@ double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], 
   return distance;
 }
 
-/* Area of a deformed face a: V0 / size_a |cof(F) e_a . n| (Nanson); the face that looks most along the normal counts. */
-double mpm_face_area(const MpmPoint *point, const double normal[3]) {
-  double inverse[9], area = 0.0;
+/* Area vectors of a deformed face a: V0 / size_a cof(F) e_a (Nanson), turned to the side of the normal. */
+double mpm_face_area(const MpmPoint *point, const double normal[3], double area[3]) {
+  double inverse[9], largest = 0.0;
   tensor_inverse(point->deformation_gradient, inverse);
   const double volume = point->volume0 * tensor_determinant(point->deformation_gradient);
+  area[0] = area[1] = area[2] = 0.0;
   for (int a = 0; a < 3; a++) {
-    double projection = 0.0;
-    for (int i = 0; i < 3; i++) projection += normal[i] * inverse[3 * a + i]; /* (F^-T)_ia */
-    if (point->size0[a] > 0.0) area = fmax(area, volume * fabs(projection) / point->size0[a]);
+    if (!(point->size0[a] > 0.0)) continue;
+    const double *row = inverse + 3 * a; /* (F^-T)_ia */
+    const double projection = volume / point->size0[a] * (normal[0] * row[0] + normal[1] * row[1] + normal[2] * row[2]);
+    if (!(fabs(projection) > largest)) continue;
+    largest = fabs(projection);
+    for (int i = 0; i < 3; i++) area[i] = copysign(volume / point->size0[a], projection) * row[i];
   }
-  return area;
+  return largest;
 }
 
 static int is_under(const Mpm *mpm, const MpmWall *wall, int node, double normal[3]) {
@@ -159,8 +163,9 @@ void mpm_wall_start(Mpm *mpm) {
   iterate(mpm, mpm->grid.state, 0);
 }
 
-/* Force on the body, and the power that slip dissipates: minus impulse times the mean of the velocities before and after it. */
-static void add_outputs(Mpm *mpm, const MpmContact *contact, const MpmVec *velocity) {
+/* Force on the body, and the power of slip: minus impulse times the mean of the node's velocities before and after the step, which
+ * is the wall's share of the change of kinetic energy while all forces act at once. */
+static void add_outputs(Mpm *mpm, const MpmContact *contact) {
   const MpmScene *scene = &mpm->scene;
   const int n = contact->node;
   if (!mpm->grid.owned[n]) return;
@@ -175,8 +180,8 @@ static void add_outputs(Mpm *mpm, const MpmContact *contact, const MpmVec *veloc
   }
   if (wall->contact != MPM_WALL_FRICTION) return;
   for (int i = 0; i < scene->dimension; i++) {
-    const double tangential = contact->change[i] - normal_change * contact->normal[i];
-    work -= mass * tangential * ((*velocity)[1 + i] - wall->velocity[i] - 0.5 * tangential);
+    const double slip = 0.5 * (mpm->grid.state[n][1 + i] + mpm->grid.rate[n][1 + i]) - wall->velocity[i];
+    work -= mass * (contact->change[i] - normal_change * contact->normal[i]) * slip;
   }
   wall->power_friction += work / mpm->dt;
 }
@@ -190,8 +195,7 @@ void mpm_wall_update(Mpm *mpm) {
     for (int i = 1; i < 4; i++) grid->rate[n][i] = grid->state[n][i] + mpm->dt * grid->rate[n][i];
   }
   iterate(mpm, grid->rate, 1);
-  for (int c = 0; c < mpm->contact_count; c++)
-    add_outputs(mpm, &mpm->contacts[c], &grid->rate[mpm->contacts[c].node]);
+  for (int c = 0; c < mpm->contact_count; c++) add_outputs(mpm, &mpm->contacts[c]);
   for (int c = 0; c < mpm->contact_count; c++) {
     const int n = mpm->contacts[c].node;
     if (!mpm->contacts[c].is_first) continue;
