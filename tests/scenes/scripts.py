@@ -16,8 +16,8 @@ region box block 0 2 0 2 -0.025 0.025 units box
 create_box 1 box
 """
 
-# A block of 20 x 10 points that falls on a floor with friction and slides against a moving box; the split of the box among
-# ranks cuts it.
+# A block of 20 x 10 points that falls on a floor with friction and slides against a moving box; the split of the box
+# among ranks cuts it.
 POINTS = """
 lattice sq 0.05 origin 0.5 0.5 0
 region block block 0.5 1.5 0.1 0.6 -0.025 0.025 units box
@@ -30,11 +30,16 @@ neighbor 0.05 bin
 timestep 2e-4
 fix E all property/global youngsModulus peratomtype 1e6
 fix nu all property/global poissonsRatio peratomtype 0.3
-fix mpm all mpm/couple grid 0.1 shape gimp transfer {transfer} material elastic plane_strain point/size 0.05 0.05 {extra}
+fix mpm all mpm/couple grid 0.1 shape gimp transfer {transfer} material elastic plane_strain &
+  point/size 0.05 0.05 {extra}
 fix g all gravity 9.81 vector 0 -1 0
 fix floor all mpm/wall mpm plane y 0 friction 0.5 side +
 fix ram all mpm/wall mpm box 1.6 1.8 -0.1 1 velocity -0.5 0 0
 """
+
+def elastic_block(boundary="f f", points=POINTS, transfer="flip 1", extra=""):
+    return BOX.format(boundary=boundary) + points + ELASTIC.format(transfer=transfer, extra=extra)
+
 
 # Everything that a point has, to the last bit, by point number.
 STATE_COLUMNS = " ".join(["f_mpm[30]", "x", "y", "vx", "vy"] + [f"f_mpm[{k}]" for k in range(1, 30)])

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """An elastic block driven by LIGGGHTS commands: what thermo output says is what mechanics says."""
 import pytest
-from scripts import BOX, ELASTIC, HEAD, POINTS
+from scripts import BOX, HEAD, POINTS, elastic_block
 
 MASS = 200 * 0.05 * 0.05 * 1000.0
 
 
 def test_free_fall_is_exact(dempm):
     """No wall is near: every point falls as one body; kinetic + potential energy and horizontal momentum stay."""
-    script = BOX.format(boundary="f f") + POINTS + ELASTIC.format(transfer="flip 1", extra="") + """
+    script = elastic_block() + """
 unfix ram
 unfix floor
 thermo 50
@@ -59,8 +59,8 @@ run 8000
 
 
 def test_moving_wall_pushes_and_its_work_is_counted(dempm):
-    """No gravity: the ram hits the block; momentum of the body = impulse of the wall, energy gained = its work less losses."""
-    script = BOX.format(boundary="f f") + POINTS.replace("vx 0.5", "vx 0") + ELASTIC.format(transfer="flip 1", extra="") + """
+    """No gravity: the ram hits the block. Momentum = impulse of the wall, energy gained = its work less losses."""
+    script = elastic_block(points=POINTS.replace("vx 0.5", "vx 0")) + """
 unfix g
 unfix floor
 thermo 1
@@ -81,8 +81,8 @@ run 1500
 
 
 def test_wall_can_be_removed_between_runs(dempm):
-    script = BOX.format(boundary="f f") + POINTS.replace("0.1 0.6", "0.5 1.0").replace("vx 0.5", "vx 0") + ELASTIC.format(
-        transfer="flip 0.99", extra="") + """
+    points = POINTS.replace("0.1 0.6", "0.5 1.0").replace("vx 0.5", "vx 0")
+    script = elastic_block(points=points, transfer="flip 0.99") + """
 unfix ram
 fix shelf all mpm/wall mpm plane y 0.5 noslip
 thermo_style custom step f_mpm[3]
@@ -99,7 +99,7 @@ run 200
 
 
 def test_too_large_time_step_is_refused_with_the_limit(dempm):
-    script = BOX.format(boundary="f f") + POINTS + ELASTIC.format(transfer="flip 1", extra="") + "timestep 0.01\nrun 1\n"
+    script = elastic_block() + "timestep 0.01\nrun 1\n"
     run = dempm(script, check=False)
     assert run.code != 0
     assert "Fix mpm/couple (id mpm): timestep 0.01 s is larger than the critical mechanical time step" in run.output
@@ -107,7 +107,7 @@ def test_too_large_time_step_is_refused_with_the_limit(dempm):
 
 @pytest.mark.parametrize("np", [1, 2])
 def test_point_that_leaves_a_fixed_box_is_named(np, dempm):
-    script = BOX.format(boundary="f f") + POINTS + ELASTIC.format(transfer="flip 1", extra="") + "unfix floor\nrun 3000\n"
+    script = elastic_block() + "unfix floor\nrun 3000\n"
     run = dempm(script, np=np, check=False)
     assert run.code != 0
     assert "left the box" in run.output and "add a fix mpm/wall" in run.output
@@ -140,5 +140,6 @@ run 600
     assert table["mpm[1]"][0] == pytest.approx(mass, rel=1e-12)
     assert max(table["floor[3]"]) > mass * 9.81
     # 1e-10: round-off of 600 steps
-    assert table["mpm[4]"][-1] == pytest.approx(-mass * 9.81 * 600 * 2e-4 + sum(table["floor[3]"][1:]) * 2e-4, rel=1e-10)
-    assert table["mpm[2]"][-1] == pytest.approx(0.1 * mass + sum(table["floor[1]"][1:]) * 2e-4, rel=1e-10)
+    impulse = [sum(table[f"floor[{k}]"][1:]) * 2e-4 for k in (1, 3)]
+    assert table["mpm[4]"][-1] == pytest.approx(-mass * 9.81 * 600 * 2e-4 + impulse[1], rel=1e-10)
+    assert table["mpm[2]"][-1] == pytest.approx(0.1 * mass + impulse[0], rel=1e-10)

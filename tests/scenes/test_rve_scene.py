@@ -13,7 +13,8 @@ def packing(shrink=0.02):
     width = 2 * GRAIN_RADIUS * (1 - OVERLAP)
     height = width * math.sqrt(3) / 2
     lines = ["LIGGGHTS data file", "", f"{COLUMNS * ROWS} atoms", "1 atom types", "",
-             f"0 {COLUMNS * width!r} xlo xhi", f"0 {ROWS * height!r} ylo yhi", "-0.0375 0.0375 zlo zhi", "", "Atoms", ""]
+             f"0 {COLUMNS * width!r} xlo xhi", f"0 {ROWS * height!r} ylo yhi", "-0.0375 0.0375 zlo zhi", "",
+             "Atoms", ""]
     for row in range(ROWS):
         for column in range(COLUMNS):
             number = row * COLUMNS + column + 1
@@ -44,7 +45,8 @@ fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.99 material rve rve p
 fix g all gravity 9.81 vector 0 -1 0
 fix floor all mpm/wall mpm plane y 0 friction 0.5 side +
 thermo 50
-thermo_style custom step f_mpm f_mpm[1] f_mpm[5] f_mpm[7] f_mpm[8] f_mpm[9] f_mpm[10] f_mpm[11] f_mpm[13] f_mpm[15] f_floor[2]
+thermo_style custom step f_mpm f_mpm[1] f_mpm[5] f_mpm[7] f_mpm[8] f_mpm[9] f_mpm[10] f_mpm[11] f_mpm[13] &
+  f_mpm[15] f_floor[2]
 thermo_modify format float %.15g
 """
 
@@ -52,12 +54,14 @@ thermo_modify format float %.15g
 def material(thermal):
     if not thermal:
         return MATERIAL.format(thermal_rve="", thermal="", melting="none")
-    text = MATERIAL.format(thermal_rve="pipe_resistance 1e3 reference 0", melting="80", thermal="thermal yes temperature 10")
+    text = MATERIAL.format(thermal_rve="pipe_resistance 1e3 reference 0", melting="80",
+                           thermal="thermal yes temperature 10")
     return text + "fix hot all mpm/wall mpm plane x 0.8 nocontact temperature 100 side +\n"
 
 
 def first(thermal, run):
-    return BOX.format(boundary="f f") + POINTS + material(thermal) + "fix_modify rve bonds install\n" + state_dump(100) + run
+    bonds = "fix_modify rve bonds install\n"
+    return BOX.format(boundary="f f") + POINTS + material(thermal) + bonds + state_dump(100) + run
 
 
 @pytest.mark.parametrize("thermal", [False, True])
@@ -115,7 +119,9 @@ def test_restart_with_another_id_is_refused(new, message, dempm, tmp_path):
     dempm(first(False, "run 10\nwrite_restart half\n"), files={"grains.data": packing()}, cwd=tmp_path)
     script = HEAD + "read_restart half\n" + material(False) + "run 1\n"
     old, name = new.replace("2 ", " "), new.split()[1]
-    script = script.replace(old, new).replace("material rve rve", "material rve " + ("rve2" if name == "rve2" else "rve"))
+    script = script.replace(old, new)
+    if name == "rve2":
+        script = script.replace("material rve rve", "material rve rve2")
     if name == "mpm2":
         script = script.replace("mpm/wall mpm ", "mpm/wall mpm2 ").replace("f_mpm", "f_mpm2")
     run = dempm(script, cwd=tmp_path, check=False)

@@ -60,11 +60,10 @@ def test_grains_and_points_do_not_feel_each_other(np, dempm, tmp_path):
         assert [row[column] for row in mine] == pytest.approx([row[column] for row in other], rel=0, abs=1e-9 * largest)
 
 
-@pytest.mark.parametrize("fix, name", [("fix bad all nve/sphere", "nve/sphere"),
-                                       ("fix bad all wall/gran model hertz tangential history primitive type 1 xplane 0.0",
-                                        "wall/gran")])
+@pytest.mark.parametrize("name, rest", [("nve/sphere", ""),
+                                        ("wall/gran", "model hertz tangential history primitive type 1 xplane 0.0")])
 @pytest.mark.parametrize("np", [1, 2])
-def test_fix_for_grains_on_points_is_refused(np, fix, name, dempm):
-    run = dempm(PAIR + GRAINS + POINTS + fix + "\nrun 1\n", np=np, check=False)
+def test_fix_for_grains_on_points_is_refused(np, name, rest, dempm):
+    run = dempm(PAIR + GRAINS + POINTS + f"fix bad all {name} {rest}\nrun 1\n", np=np, check=False)
     assert run.code != 0
     assert f"fix bad (style {name}) acts on particles of group points, which are material points" in run.output
