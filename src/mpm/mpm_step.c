@@ -232,6 +232,7 @@ static BaseStatus step_law_first(Mpm *mpm, MpmPoint *points) {
   const int what = (mpm->scene.mechanical ? MPM_GRADIENT_VELOCITY : 0) | (mpm->scene.thermal ? MPM_GRADIENT_TEMPERATURE : 0);
   mpm_g2p_gradient(mpm, points, what);
   TRY(mpm_law_run(mpm, points, mpm->dt));
+  drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
   return advance(mpm, points);
 }
 
