@@ -162,7 +162,7 @@ BaseStatus rve_packing_replicate(const RvePacking *packing, const int copies[3],
                         "packing: %d copies along direction %d; 1 to 10000 are allowed, 1 along z in 2D", copies[k],
                         k + 1);
     cells *= copies[k];
-    if (cells * ((int64_t)packing->grains + packing->contacts) > INT_MAX / 4)
+    if (cells * ((int64_t)packing->grains + packing->contacts) > INT_MAX / 128)
       return base_error(BASE_ERROR_ARGUMENT, "packing: %lld copies of %d grains are too many", (long long)cells,
                         packing->grains);
   }

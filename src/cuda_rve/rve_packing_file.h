@@ -98,4 +98,7 @@ int packing_is_text(const PackingFile *file);
 BaseStatus packing_from_box(const PackingFile *file, PackingBox *box, int dimension, double tangential_stiffness,
                             RvePacking *packing);
 
+/* rve_packing_read_history() of a file that is in memory; for it, and for tests and the fuzzer. */
+BaseStatus packing_read_bytes(const PackingFile *file, int dimension, double tangential_stiffness, RvePacking *packing);
+
 #endif

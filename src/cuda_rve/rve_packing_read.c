@@ -194,16 +194,23 @@ static BaseStatus read_any(const PackingFile *file, int dimension, double tangen
   return BASE_OK;
 }
 
-BaseStatus rve_packing_read_history(const char *name, int dimension, double tangential_stiffness, RvePacking *packing) {
-  char *bytes = NULL;
-  size_t size = 0;
+BaseStatus packing_read_bytes(const PackingFile *file, int dimension, double tangential_stiffness,
+                              RvePacking *packing) {
   *packing = (RvePacking){0};
   if (dimension != 2 && dimension != 3)
-    return base_error(BASE_ERROR_ARGUMENT, "packing file %s: dimension %d; 2 or 3 is allowed", name, dimension);
-  TRY(load(name, &bytes, &size));
-  const PackingFile file = {.name = name, .bytes = bytes, .size = size};
-  const BaseStatus status = read_any(&file, dimension, tangential_stiffness, packing);
+    return base_error(BASE_ERROR_ARGUMENT, "packing file %s: dimension %d; 2 or 3 is allowed", file->name, dimension);
+  const BaseStatus status = read_any(file, dimension, tangential_stiffness, packing);
   if (status != BASE_OK) rve_packing_destroy(packing);
+  return status;
+}
+
+BaseStatus rve_packing_read_history(const char *name, int dimension, double tangential_stiffness, RvePacking *packing) {
+  char *bytes = NULL;
+  PackingFile file = {.name = name};
+  *packing = (RvePacking){0};
+  TRY(load(name, &bytes, &file.size));
+  file.bytes = bytes;
+  const BaseStatus status = packing_read_bytes(&file, dimension, tangential_stiffness, packing);
   base_free(bytes);
   return status;
 }
