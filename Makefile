@@ -17,8 +17,8 @@ DEPS ?= yes
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize check-cuda install clean help deps programs \
-         FORCE
+PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize fuzz run-fuzzers check-cuda install clean \
+         help deps programs FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -40,7 +40,7 @@ CUDA_HOME = $(patsubst %/bin/nvcc,%,$(realpath $(NVCC)))
 CUDA_LIBS = $(if $(CU_SOURCES),-L$(firstword $(wildcard $(CUDA_HOME)/lib64 $(CUDA_HOME)/targets/*/lib)) \
               -lcudart_static -ldl -lrt -lpthread)
 CUDA_ARCHS = $(filter 80 90 100,$(patsubst compute_%,%,$(shell $(NVCC) --list-gpu-arch)))
-NVCC_FLAGS = -std=c++17 -O3 -lineinfo $(foreach a,$(CUDA_ARCHS),-gencode arch=compute_$(a),code=sm_$(a)) \
+NVCC_FLAGS = -std=c++17 -O3 -lineinfo --threads 0 $(foreach a,$(CUDA_ARCHS),-gencode arch=compute_$(a),code=sm_$(a)) \
              -gencode arch=compute_$(lastword $(CUDA_ARCHS)),code=compute_$(lastword $(CUDA_ARCHS)) \
              -Xcompiler -fPIC,-fopenmp,-Wall,-Wextra -DDEMPM_CUDA
 C_LIBS = $(CUDA_LIBS) $(if $(CU_SOURCES),-lstdc++) -lm
@@ -67,6 +67,7 @@ PROGRAMS := $(if $(wildcard src/fix_mpm_couple/main.cpp),$(BUILD)/dempm) \
 TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c)) \
          $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
+FUZZERS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(wildcard tests/fuzz/fuzz_*.c))
 
 # ------------------------------------------------------------------------------------------------------- compile, link
 # One short line per file; V=1 shows the commands.
@@ -117,6 +118,9 @@ $(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
 $(BUILD)/bench/%: tests/bench/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
+$(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
+	@mkdir -p $(@D)
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
 
 -include $(shell test -d $(BUILD) && find $(BUILD) -name '*.d')
 
@@ -132,9 +136,14 @@ test-scenes: programs
 	$(PYTEST) tests --ignore=tests/test_unit.py
 test-gpu: $(TESTS)
 	$(RUN_ENV) DEMPM_BACKEND=cuda $(PYTHON) -m pytest -q -p no:cacheprovider tests/test_unit.py
+SANITIZED = $(MAKE) BUILD=$(BUILD)/sanitize OPT="-O1 -g -fno-omit-frame-pointer" NVCC= \
+            SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
 sanitize:
-	$(MAKE) BUILD=$(BUILD)/sanitize OPT="-O1 -g -fno-omit-frame-pointer" NVCC= \
-	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-unit
+	$(SANITIZED) test-unit
+fuzz:
+	$(SANITIZED) run-fuzzers
+run-fuzzers: $(FUZZERS)
+	$(foreach f,$(FUZZERS),DEMPM_TEST_DATA=tests/data $(f) &&) true
 bench: programs $(BENCHES)
 	$(foreach b,$(BENCHES),$(b) cpu &&) true
 bench-gpu: programs $(BENCHES)
@@ -147,7 +156,7 @@ ifeq ($(strip $(NVCC)),)
 	@echo "check-cuda: nvcc not found (PATH, /usr/local/cuda/bin): the CUDA sources are not compiled"
 else
 	@mkdir -p $(BUILD)/check-cuda
-	$(foreach f,$(CU_SOURCES),$(NVCC) $(NVCC_FLAGS) -Werror all-warnings -Xptxas -warn-spills -c $(f) \
+	$(foreach f,$(CU_SOURCES),$(NVCC) $(NVCC_FLAGS) -Werror all-warnings -c $(f) \
 	  -o $(BUILD)/check-cuda/$(notdir $(f)).o &&) true
 	@echo "check-cuda: $(words $(CU_SOURCES)) file(s) for $(CUDA_ARCHS:%=sm_%)"
 endif
@@ -183,6 +192,7 @@ help:
 	@echo "make test         unit tests and scenes (test-unit, test-scenes: one of them; test-gpu: on a GPU)"
 	@echo "make bench        timings of the RVE engine on the CPU (bench-gpu: on a GPU)"
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
+	@echo "make fuzz         mutated packing files under the sanitizers"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"

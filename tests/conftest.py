@@ -24,6 +24,7 @@ def environment(threads=1):
     """Open MPI refuses root and more ranks than cores unless told; ranks that wait must not burn the others' core."""
     settings = {
         "OMP_NUM_THREADS": str(threads),
+        "DEMPM_TEST_DATA": str(ROOT / "tests" / "data"),
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_rmaps_base_oversubscribe": "1",
