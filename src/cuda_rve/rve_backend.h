@@ -28,6 +28,8 @@ extern const RveKernels rve_kernels_avx2, rve_kernels_avx512;
 typedef struct RveDevice RveDevice;
 typedef struct RveDeviceJob {
   int rve;             /* which RVE */
+  int refresh;         /* 1: only forces of the present state; works done stay as they are */
+  int pairs;           /* candidate pairs to have room for */
   int outcome;         /* out: RveOutcome */
   RveCall call;
   double work_before, duration;

@@ -273,6 +273,8 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
     memset(job, 0, sizeof *job);
     TRY(rve_call_make(&batch->scene, head, input ? &input[k] : &nothing, duration, &job->call));
     job->rve = rve;
+    job->refresh = input == NULL;
+    job->pairs = pairs_for(&batch->record[rve]);
     job->work_before = batch->record[rve].last.friction_work;
     job->duration = duration;
     job->answer = batch->record[rve].last;
@@ -288,6 +290,7 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
         TRY(download(batch, job->rve));
         TRY(rve_record_grow(record));
         TRY(upload(batch, job->rve));
+        job->pairs = pairs_for(record);
         batch->job[left++] = *job;
         continue;
       }

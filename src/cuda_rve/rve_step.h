@@ -35,8 +35,8 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
 
 /* Rows of all grains, after the list has moved them or at the start. */
 RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCounts *n, const RveArrays *a) {
-  if (!RVE_ROWS) return;
-  for (int block = team->pack; block < n->blocks; block += team->packs) {
+  const int blocks = RVE_ROWS ? n->blocks : 0;
+  for (int block = team->pack; block < blocks; block += team->packs) {
     RveBody b = rve_own_body(ft, a, block * RVE_PACK);
     if (!ft.tangential)
       for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], block * RVE_PACK);
@@ -48,7 +48,9 @@ RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCount
 /* Looks whether the list is really spent (the running bound is a sum of maxima); if so, builds the next. */
 RVE_FN RveOutcome rve_renew_list(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
                                  const RveArrays *a, RveScratch *s) {
-  if (head->list_due == RVE_LIST_CHECK && head->need_pairs == 0) {
+  const int check = head->list_due == RVE_LIST_CHECK && head->need_pairs == 0;
+  rve_sync(); /* all have read the head before the leader changes it */
+  if (check) {
     const double farthest = rve_farthest(ft.dimension, team, head, n, a);
     if (team->leader) {
       head->stretch = rve_least_stretch(head);
@@ -56,7 +58,9 @@ RVE_FN RveOutcome rve_renew_list(RveFeatures ft, const RveTeam *team, const RveC
       if (2.0 * head->reach <= 0.85 * rve_room(head)) head->list_due = RVE_LIST_GOOD;
     }
     rve_sync();
-    if (!head->list_due) return RVE_DONE;
+    const int good = head->list_due == RVE_LIST_GOOD;
+    rve_sync();
+    if (good) return RVE_DONE;
   }
   if (team->leader) {
     const int built = rve_build_list(call, head, n, a, s);
