@@ -152,11 +152,16 @@ RVE_FN rve_real rve_dot(int dim, const rve_real a[3], const rve_real b[3]) {
   return c;
 }
 
+/* Coulomb's cap, mu |fn|. Springs alone push wherever grains touch; what other lanes get is dropped later. */
+RVE_FN rve_real rve_cap(RveFeatures ft, const RveContactPass *c, rve_real fn) {
+  return c->mu * (ft.viscous || ft.bonds ? rve_abs(fn) : fn);
+}
+
 /* Tangential part: history, Coulomb's cap (or the bond), dashpot. stick: lanes that an intact bond exempts from the cap. Follows
  * LIGGGHTS' `tangential history`: the dashpot acts on contacts that do not slide and is outside the cap. */
 RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, rve_mask touch, rve_mask bonded, rve_real trial, rve_real vt,
                               rve_real fn, rve_real gt, rve_real *spring, rve_real *total, rve_real *slip, rve_real *loss) {
-  const rve_real zero = rve_set(0.0), cap = c->mu * rve_abs(fn);
+  const rve_real zero = rve_set(0.0), cap = rve_cap(ft, c, fn);
   rve_real f = rve_min(rve_max(trial, zero - cap), cap);
   if (ft.bonds) f = rve_select(bonded, trial, f);
   f = rve_keep(touch, f);
@@ -173,8 +178,8 @@ RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, rve_mask 
 RVE_FN void rve_tangential_3d(RveFeatures ft, const RveContactPass *c, rve_mask touch, rve_mask bonded, const rve_real trial[3],
                               rve_real size2, const rve_real vt[3], rve_real fn, rve_real gt, rve_real spring[3],
                               rve_real total[3], rve_real *slip, rve_real *loss) {
-  const rve_real one = rve_set(1.0), cap = c->mu * rve_abs(fn);
-  rve_real factor = rve_min(one, cap / rve_sqrt(size2 + rve_set(1e-300)));
+  const rve_real one = rve_set(1.0), cap = rve_cap(ft, c, fn);
+  rve_real factor = rve_min(one, cap * rve_inverse_sqrt(size2 + rve_set(1e-300)));
   if (ft.bonds) factor = rve_select(bonded, one, factor);
   factor = rve_keep(touch, factor);
   *slip = *slip + (one - factor) * factor * size2;
@@ -205,7 +210,7 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
   const rve_real zero = rve_set(0.0), half = rve_set(0.5);
   rve_real d[3], n[3], u[3];
   rve_branch(dim, c->h, own->s, other.s, image, d);
-  const rve_real distance = rve_sqrt(rve_dot(dim, d, d)), inverse = rve_set(1.0) / distance;
+  const rve_real square = rve_dot(dim, d, d), inverse = rve_inverse_sqrt(square), distance = square * inverse;
   const rve_real radii = own->r + other.r, overlap = radii - distance;
   for (int k = 0; k < dim; k++) n[k] = d[k] * inverse;
   rve_mask touch = rve_less(zero, overlap), bonded = touch;

@@ -5,9 +5,9 @@
 /* ------------------------------------------------------------------------------------------- A2: no image is missed */
 
 #if defined(__SANITIZE_ADDRESS__)
-enum { CELLS = 20000 }; /* sanitizers cost a factor of ten */
+enum { CELLS = 20000, STAGES = 1, CALLS = 30 }; /* sanitizers cost a factor of ten */
 #else
-enum { CELLS = 1000000 };
+enum { CELLS = 1000000, STAGES = 8, CALLS = 300 };
 #endif
 enum { CELLS_PER_BATCH = 2000, GRAINS_MAX = 3, BRANCHES_MAX = 64 };
 
@@ -158,7 +158,7 @@ static void no_contact_is_missed_in_motion(void **state) {
       for (int i = 0; i < packing.grains; i++)
         for (int k = 0; k < dim; k++) packing.velocity[3 * i + k] = help_uniform(&seed, -3.0, 3.0);
       RveBatch *batch = help_batch(&scene, &packing);
-      for (int call = 0; call < 300; call++) {
+      for (int call = 0; call < CALLS; call++) {
         double gradient[9] = {0.0};
         RvePacking now;
         int expected = 0;
@@ -294,7 +294,7 @@ static void reduction_keeps_stress_and_histories(void **state) {
     scene.local_damping = 0.5;
     RveBatch *batch = help_batch(&scene, &packing);
     gradient[1] = 10.0, gradient[4] = 0.1; /* gamma = 10 in 2D, 4 in 3D */
-    for (int stage = 0; stage < 8; stage++) {
+    for (int stage = 0; stage < STAGES; stage++) {
       const RveAnswer answer = help_step(batch, gradient, 0.0, dim == 2 ? 0.125 : 0.05);
       RvePacking skewed;
       MUST(rve_batch_packing(batch, 0, &skewed));
