@@ -68,7 +68,7 @@ typedef struct RvePacking {
   double *position;        /* [grains][3] fractional s in [-0.5, 0.5); s_z = 0 in 2D */
   double *radius;          /* [grains] m */
   double *velocity;        /* [grains][3] m/s, relative to the affine flow; NULL = at rest */
-  double *spin;            /* [grains][3] rad/s (2D: z only); NULL = at rest */
+  double *spin;            /* [grains][3] rad/s (2D: z only), relative to the affine flow's vorticity; NULL = at rest */
   /* Tangential history, so that a packing prepared with friction starts in equilibrium; 0 contacts = unknown. */
   int contacts;
   int *contact_pair;       /* [contacts][2] grain indices */
@@ -86,7 +86,8 @@ BaseStatus rve_packing_replicate(const RvePacking *packing, const int copies[3],
 /* What a material point asks of its RVE: one constant velocity gradient and temperature over `duration`. */
 typedef struct RveInput {
   double velocity_gradient[9]; /* L_ij = dv_i/dx_j, 1/s (eq. 46b) */
-  double temperature;          /* at the end of the call; grains change linearly to it. Ignored if !thermal */
+  double temperature;          /* at the end of the call; grains change linearly to it over the DEM steps, starting from the last call's (at
+                                  first: reference_temperature). Ignored if !thermal */
 } RveInput;
 
 typedef struct RveAnswer {
@@ -148,7 +149,7 @@ typedef struct RveView {
   double *position;     /* [grains][3] m, wrapped into the cell */
   double *radius;       /* [grains] current (expanded) */
   double *velocity;     /* [grains][3] fluctuation */
-  double *spin;         /* [grains][3] */
+  double *spin;         /* [grains][3] rad/s, relative to the affine flow's vorticity */
   int contacts;         /* pairs with overlap > 0 or an intact bond */
   int *pair;            /* [contacts][2] */
   int *image;           /* [contacts][3] */
