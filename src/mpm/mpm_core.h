@@ -145,8 +145,10 @@ void mpm_g2p_velocity(Mpm *mpm, const MpmVec *field);                /* field ->
 BaseStatus mpm_extended_velocity(Mpm *mpm);                          /* XPIC: state -> extended. Collective */
 
 /* mpm_law_batch.c */
-BaseStatus mpm_law_run(Mpm *mpm, MpmPoint *points, double dt); /* the law for own points. Collective */
-BaseStatus mpm_load_points(Mpm *mpm, const MpmPoint *points);  /* loads of own and foreign points. Collective */
+/* The law for own points; with_load also fills their loads, while the points are in the cache. Collective. */
+BaseStatus mpm_law_run(Mpm *mpm, MpmPoint *points, double dt, int with_load);
+void mpm_load_fill(Mpm *mpm, const MpmPoint *points);         /* loads of own points */
+BaseStatus mpm_load_finish(Mpm *mpm, const MpmPoint *points); /* tractions, flux walls, loads of foreign points. Collective */
 
 /* mpm_heat.c */
 void mpm_heat_start(Mpm *mpm);                                       /* nodal temperature, temperature walls */

@@ -51,17 +51,6 @@ static void take_answer(Mpm *mpm, MpmPoint *point, int s, double dt) {
   if (!isfinite(sum)) mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "heat source or conductivity is not finite");
 }
 
-BaseStatus mpm_law_run(Mpm *mpm, MpmPoint *points, double dt) {
-  MpmPoints *p = &mpm->points;
-  if (!mpm->scene.mechanical || dt == 0.0)
-    memset(p->law_velocity_gradient, 0, 9 * (size_t)p->live * sizeof *p->law_velocity_gradient);
-  fill_batch(mpm, points, dt);
-  TRY(mpm->law->update(mpm->law->content, &p->batch));
-#pragma omp parallel for num_threads(mpm->threads) if (p->live > MPM_PARALLEL_POINTS)
-  for (int s = 0; s < p->live; s++) take_answer(mpm, &points[s], s, dt);
-  return BASE_OK;
-}
-
 /* load[0]: {W, N} on the point; load[1 + j]: what meets the slope of S along j, {V q_j, -V sigma_ij} (TM-DEMPM eq. 17 corrected, 18),
  * with q = -k grad T; slopes are per unit of x / h, hence 1 / h. */
 static void fill_load(const Mpm *mpm, const MpmPoint *point, MpmVec *load) {
@@ -84,11 +73,31 @@ static void fill_load(const Mpm *mpm, const MpmPoint *point, MpmVec *load) {
   }
 }
 
-BaseStatus mpm_load_points(Mpm *mpm, const MpmPoint *points) {
+BaseStatus mpm_law_run(Mpm *mpm, MpmPoint *points, double dt, int with_load) {
+  MpmPoints *p = &mpm->points;
+  const size_t width = (size_t)mpm_load_width(mpm);
+  if (!mpm->scene.mechanical || dt == 0.0)
+    memset(p->law_velocity_gradient, 0, 9 * (size_t)p->live * sizeof *p->law_velocity_gradient);
+  fill_batch(mpm, points, dt);
+  TRY(mpm->law->update(mpm->law->content, &p->batch));
+#pragma omp parallel for num_threads(mpm->threads) if (p->live > MPM_PARALLEL_POINTS)
+  for (int s = 0; s < p->live; s++) {
+    take_answer(mpm, &points[s], s, dt);
+    if (with_load) fill_load(mpm, &points[s], p->load + width * (size_t)s);
+  }
+  return BASE_OK;
+}
+
+void mpm_load_fill(Mpm *mpm, const MpmPoint *points) {
   MpmPoints *p = &mpm->points;
   const size_t width = (size_t)mpm_load_width(mpm);
 #pragma omp parallel for num_threads(mpm->threads) if (p->live > MPM_PARALLEL_POINTS)
   for (int s = 0; s < p->live; s++) fill_load(mpm, &points[s], p->load + width * (size_t)s);
+}
+
+BaseStatus mpm_load_finish(Mpm *mpm, const MpmPoint *points) {
+  MpmPoints *p = &mpm->points;
+  const size_t width = (size_t)mpm_load_width(mpm);
   if (p->live > 0 && mpm->scene.mechanical) mpm_traction_add(mpm, points, p->load);
   if (p->live > 0 && mpm->scene.thermal) mpm_heat_walls(mpm, points, p->load);
   if (!mpm->halo) return BASE_OK;

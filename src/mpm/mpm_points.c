@@ -217,6 +217,8 @@ BaseStatus mpm_points_sort(Mpm *mpm, const MpmPoint *own) {
   return BASE_OK;
 }
 
+enum { AHEAD = 8 /* points ahead in the sorted order that are fetched */ };
+
 void mpm_points_load(Mpm *mpm, const MpmPoint *own) {
   MpmPoints *p = &mpm->points;
   const MpmScene *scene = &mpm->scene;
@@ -224,6 +226,12 @@ void mpm_points_load(Mpm *mpm, const MpmPoint *own) {
 #pragma omp parallel for num_threads(mpm->threads) if (p->count > MPM_PARALLEL_POINTS)
   for (int k = 0; k < p->count; k++) {
     const MpmPoint *point = mpm_slot_point(mpm, own, p->item[k].slot);
+    if (k + AHEAD < p->count) {
+      const char *next = (const char *)mpm_slot_point(mpm, own, p->item[k + AHEAD].slot);
+      __builtin_prefetch(next);
+      __builtin_prefetch(next + 64);
+      __builtin_prefetch(next + 128);
+    }
     for (int i = 0; i < scene->dimension; i++) p->place[k][i] = grid_coordinate(mpm, point, i);
     p->place[k][3] = point->mass;
     p->motion[k] = (MpmVec){1.0, point->velocity[0], point->velocity[1], has_z ? point->velocity[2] : 0.0};

@@ -170,7 +170,7 @@ static BaseStatus start_grid(Mpm *mpm) {
 
 /* Forces and heat at the points -> rates at the nodes -> points. */
 static BaseStatus advance(Mpm *mpm, MpmPoint *points) {
-  TRY(mpm_load_points(mpm, points));
+  TRY(mpm_load_finish(mpm, points));
   mpm_p2g_load(mpm);
   find_node_acceleration(mpm);
   if (mpm->scene.thermal) mpm_heat_update(mpm);
@@ -212,26 +212,13 @@ static BaseStatus renew_state(Mpm *mpm, const MpmPoint *points) {
   return BASE_OK;
 }
 
-static void check_points(Mpm *mpm, const MpmPoint *points) {
-#pragma omp parallel for num_threads(mpm->threads) if (mpm->points.live > MPM_PARALLEL_POINTS)
-  for (int s = 0; s < mpm->points.live; s++) {
-    const MpmPoint *point = &points[s];
-    double velocity = 0.0, position = 0.0;
-    for (int i = 0; i < mpm->scene.dimension; i++) velocity += point->velocity[i], position += point->position[i];
-    if (!isfinite(velocity)) mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "velocity is not finite");
-    else if (!isfinite(position)) mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "position is not finite");
-    else if (mpm->scene.thermal && !isfinite(point->temperature))
-      mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "temperature is not finite");
-  }
-}
-
 /* ----------------------------------------------------------------------------------------------------------- the step */
 
 /* USF (TM-DEMPM fig. 3): the law first, with the velocity of the incoming points. */
 static BaseStatus step_law_first(Mpm *mpm, MpmPoint *points) {
   const int what = (mpm->scene.mechanical ? MPM_GRADIENT_VELOCITY : 0) | (mpm->scene.thermal ? MPM_GRADIENT_TEMPERATURE : 0);
   mpm_g2p_gradient(mpm, points, what);
-  TRY(mpm_law_run(mpm, points, mpm->dt));
+  TRY(mpm_law_run(mpm, points, mpm->dt, 1));
   drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
   return advance(mpm, points);
 }
@@ -239,12 +226,13 @@ static BaseStatus step_law_first(Mpm *mpm, MpmPoint *points) {
 /* USL, MUSL: the law last, with the updated velocity. */
 static BaseStatus step_law_last(Mpm *mpm, MpmPoint *points) {
   if (mpm->scene.thermal) mpm_g2p_gradient(mpm, points, MPM_GRADIENT_TEMPERATURE);
+  mpm_load_fill(mpm, points);
   TRY(advance(mpm, points));
   if (mpm->scene.mechanical) {
     TRY(renew_state(mpm, points));
     mpm_g2p_gradient(mpm, points, MPM_GRADIENT_VELOCITY);
   }
-  return mpm_law_run(mpm, points, mpm->dt);
+  return mpm_law_run(mpm, points, mpm->dt, 0);
 }
 
 BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt) {
@@ -256,7 +244,6 @@ BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt) {
   TRY(gather_points(mpm, points, count));
   TRY(start_grid(mpm));
   TRY(mpm->scene.order == MPM_ORDER_USF ? step_law_first(mpm, points) : step_law_last(mpm, points));
-  check_points(mpm, points);
   return report(mpm);
 }
 
@@ -266,7 +253,7 @@ BaseStatus mpm_initialise(Mpm *mpm, MpmPoint *points, int count) {
   TRY(mpm_points_reserve(mpm, count));
   mpm->points.own = mpm->points.live = count;
   for (int s = 0; s < count; s++) points[s].temperature_mapped = points[s].temperature_law = points[s].temperature;
-  TRY(mpm_law_run(mpm, points, 0.0));
+  TRY(mpm_law_run(mpm, points, 0.0, 0));
   return report(mpm);
 }
 

@@ -4,6 +4,7 @@
  * P2G: the points of a cell share their nodes, so a cell is summed in registers and then added to the nodes. Cells go slab by slab, first
  * the slabs of even global index, then the odd ones: the order of the sums at a node is that of (slab colour, cell, tag), for
  * every number of threads and ranks. */
+#include <math.h>
 #include <string.h>
 
 #include "mpm_core.h"
@@ -26,6 +27,7 @@
   }
 
 enum { NODES_MAX = 27 };
+enum { AHEAD = 8 /* points ahead in the sorted order that are fetched: the caller's order may be any */ };
 
 typedef struct Weights {
   double f[3]; /* point - first node of its support, over h */
@@ -150,6 +152,11 @@ MPM_INLINE void load_body(Mpm *mpm, const int range[2], int dimension, MpmShape 
       Weights w;
       find_weights(points, k, base, dimension, shape, &w);
       const MpmVec *load = points->load + (size_t)points->item[k].slot * (size_t)(1 + dimension);
+      if (k + AHEAD < points->count) {
+        const MpmVec *next = points->load + (size_t)points->item[k + AHEAD].slot * (size_t)(1 + dimension);
+        __builtin_prefetch(next);
+        __builtin_prefetch(next + 2);
+      }
       for (int r = 0; r < rows; r++) {
         const int b = r % width, c = r / width;
         const double weight = dimension == 3 ? w.value[1][b] * w.value[2][c] : w.value[1][b];
@@ -318,6 +325,24 @@ MPM_INLINE void update_affine(const Mpm *mpm, MpmPoint *point, const int *row, c
       point->affine[3 * i + j] = mpm->inverse_spacing * (before[j][1 + i] + mpm->dt * change[j][1 + i]);
 }
 
+static void check_point(Mpm *mpm, const MpmPoint *point) {
+  double velocity = 0.0, position = 0.0;
+  for (int i = 0; i < mpm->scene.dimension; i++) velocity += point->velocity[i], position += point->position[i];
+  if (isfinite(velocity + position) && !(mpm->scene.thermal && !isfinite(point->temperature))) return;
+  mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag,
+                 !isfinite(velocity)   ? "velocity is not finite"
+                 : !isfinite(position) ? "position is not finite"
+                                       : "temperature is not finite");
+}
+
+/* The lines with position and velocity. */
+MPM_INLINE void prefetch_point(const MpmPoints *points, const MpmPoint *own, int k) {
+  if (k + AHEAD >= points->count || points->item[k + AHEAD].slot >= points->own) return;
+  const char *point = (const char *)(own + points->item[k + AHEAD].slot);
+  __builtin_prefetch(point, 1);
+  __builtin_prefetch(point + 64, 1);
+}
+
 MPM_INLINE void update_body(Mpm *mpm, MpmPoint *out, const int range[2], int dimension, MpmShape shape) {
   const MpmPoints *points = &mpm->points;
   const MpmGrid *grid = &mpm->grid;
@@ -328,6 +353,7 @@ MPM_INLINE void update_body(Mpm *mpm, MpmPoint *out, const int range[2], int dim
     const int *row = grid->cell_row[cell];
     find_base(grid->cell_key[cell], dimension, base);
     for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++) {
+      prefetch_point(points, out, k);
       if (points->item[k].slot >= points->own) continue;
       MpmPoint *point = out + points->item[k].slot;
       Weights w;
@@ -339,10 +365,12 @@ MPM_INLINE void update_body(Mpm *mpm, MpmPoint *out, const int range[2], int dim
         point->temperature += mpm->dt * rate[0];
         point->temperature_mapped = value[0] + mpm->dt * rate[0];
       }
-      if (!scene->mechanical) continue;
-      if (scene->transfer == MPM_TRANSFER_XPIC) gather_value(grid->extended, row, &w, dimension, width, &extended);
-      update_motion(mpm, point, &value, &rate, &extended);
-      if (scene->transfer == MPM_TRANSFER_APIC) update_affine(mpm, point, row, &w, dimension, shape);
+      if (scene->mechanical) {
+        if (scene->transfer == MPM_TRANSFER_XPIC) gather_value(grid->extended, row, &w, dimension, width, &extended);
+        update_motion(mpm, point, &value, &rate, &extended);
+        if (scene->transfer == MPM_TRANSFER_APIC) update_affine(mpm, point, row, &w, dimension, shape);
+      }
+      check_point(mpm, point);
     }
   }
 }
