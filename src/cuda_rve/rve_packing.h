@@ -30,7 +30,7 @@ typedef struct RveGenerator {
   double radius_min, radius_max; /* m, uniform distribution */
   double pressure;           /* Pa, > 0 (compression) */
   double preparation_friction;   /* mu while consolidating */
-  double solid_fraction;     /* of the initial gas; 0 = default: 0.72 in 2D, 0.35 in 3D */
+  double solid_fraction;     /* of the initial gas; 0 = default: 0.74 in 2D, 0.35 in 3D */
   double stress_tolerance;   /* |sigma/p - 1|, default 1e-3 */
   double unbalanced_tolerance;   /* default 1e-3 */
   int64_t max_steps;         /* default 2,000,000 */

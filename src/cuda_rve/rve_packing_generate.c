@@ -8,9 +8,9 @@
 #include "rve_packing_pairs.h"
 
 /* Solid fraction of the gas. Errata A.6 says 0.55 in 2D, but friction preserves what the gas was: from 0.55, mu = 0.5
- * gives void ratios of 0.243 at 100 kPa and 0.262 at 10 kPa (means of 8 seeds), from 0.72 0.232 and 0.253 (16 seeds;
- * the paper 0.236 and 0.243 to 0.251). mu = 0.01 gives 0.167 from both. */
-static const double default_fraction_2d = 0.72, default_fraction_3d = 0.35;
+ * gives void ratios of 0.243 at 100 kPa and 0.262 at 10 kPa (means of 8 seeds), from 0.74 0.230 and 0.250 (72 packings;
+ * the paper 0.236 and 0.243 to 0.251). mu = 0.01 gives 0.166 from both. */
+static const double default_fraction_2d = 0.74, default_fraction_3d = 0.35;
 
 RveGenerator rve_generator_default(void) {
   return (RveGenerator){.grains = 400,
@@ -22,7 +22,7 @@ RveGenerator rve_generator_default(void) {
                         .stress_tolerance = 1e-3,
                         .unbalanced_tolerance = 1e-3,
                         .max_steps = 2000000,
-                        .seed = 5 /* one whose void ratios lie near the means of many */};
+                        .seed = 1};
 }
 
 static BaseStatus outside(const char *name, double value, const char *allowed) {

@@ -17,8 +17,8 @@ typedef struct Fixture {
   const char *name;
   int dimension, grains;
 } Fixture;
-static const Fixture fixtures[] = {{"layer.data", 2, 40},    {"layer.dump", 2, 40},    {"layer.restart", 2, 40},
-                                   {"ranks.restart", 2, 40}, {"spheres.data", 3, 64},  {"spheres.dump", 3, 64},
+static const Fixture fixtures[] = {{"layer.data", 2, 40},     {"layer.dump", 2, 40},   {"layer.restart", 2, 40},
+                                   {"ranks.restart", 2, 40},  {"spheres.data", 3, 64}, {"spheres.dump", 3, 64},
                                    {"spheres.restart", 3, 64}};
 enum { FIXTURES = sizeof fixtures / sizeof *fixtures };
 
@@ -69,12 +69,19 @@ PACKING_HELP size_t pick(uint64_t *random, size_t count) { return (size_t)(base_
 
 /* Changes the first *size of bytes (room for 2 * *size + 64) in one of several ways. */
 PACKING_HELP void mutate(char *bytes, size_t *size, uint64_t *random) {
-  static const char *const word[] = {"nan", "-1", "1e308", "99999999999", "0", "ITEM: ATOMS", "Atoms", "\n", "#", "inf", "-1e-320"};
+  static const char *const word[] = {"nan",   "-1", "1e308", "99999999999", "0",      "ITEM: ATOMS",
+                                     "Atoms", "\n", "#",     "inf",         "-1e-320"};
   const size_t n = *size, at = pick(random, n), length = 1 + pick(random, n - at < 64 ? n - at : 64);
   switch (pick(random, 7)) {
-  case 0: bytes[at] = (char)pick(random, 256); break;
-  case 1: bytes[at] = (char)(bytes[at] ^ (1 << pick(random, 8))); break;
-  case 2: *size = at; break;
+  case 0:
+    bytes[at] = (char)pick(random, 256);
+    break;
+  case 1:
+    bytes[at] = (char)(bytes[at] ^ (1 << pick(random, 8)));
+    break;
+  case 2:
+    *size = at;
+    break;
   case 3: /* a piece is cut out */
     memmove(bytes + at, bytes + at + length, n - at - length);
     *size = n - length;
@@ -111,7 +118,8 @@ PACKING_HELP long fuzz_readers(long count, uint64_t seed) {
       RvePacking packing;
       if (read_copy(bytes, now, 2 + (int)pick(&random, 2), &packing) == BASE_OK) {
         accepted++;
-        if (rve_packing_check(&packing) != BASE_OK) fprintf(stderr, "accepted, but: %s\n", base_error_message()), abort();
+        if (rve_packing_check(&packing) != BASE_OK)
+          fprintf(stderr, "accepted, but: %s\n", base_error_message()), abort();
         rve_packing_destroy(&packing);
       }
     }
