@@ -49,7 +49,7 @@ typedef struct RveScene {
   double bond_melting_temperature; /* T_s, INFINITY = does not melt; beta_b = beta_a clip((Ts-T)/(Ts-Tref),0,1) (eq. 40 corrected) */
 
   double time_step;           /* DEM time step, s; 0 = time_step_fraction of the critical one */
-  double time_step_fraction;  /* default 0.25, of the smallest 2 sqrt(m/(kn W)) bound over the packing */
+  double time_step_fraction;  /* default 0.5, of rve_critical_time_step() of the packing */
   int substeps;               /* 0: ceil(duration / time_step), physical time (errata A.6). N > 0: exactly N DEM steps per
                                  call, the whole deformation spread over them (quasi-static relaxation time) */
   double skin;                /* neighbour skin as a fraction of the largest radius; 0 = automatic */

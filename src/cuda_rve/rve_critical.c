@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The critical DEM time step of a packing.
  *
- * Contacts are springs b_i x_i - b_j x_j between two grains' displacements and rotations, so x'K x <= 2 sum_i x_i' K_ii x_i: the
- * largest eigenvalue of M^-1 K is at most twice the largest one of a single grain's block with its neighbours held. That gives
- * 4 + 4r and 16r (square), 6 + 6r and 24r (hexagonal; exact 6 + 2r for r < 1/3), 4 + 8r and 20r (simple cubic) of verification
- * A: met exactly or from below. Neighbours count from a gap of 5 % of the radii on, because grains arrange themselves anew;
- * a grain with few neighbours is given the stiffness of a square (cubic) surrounding. */
+ * Leapfrog whose dashpots lag half a step: a mode x is stable while dt^2 x'Kx + 2 dt x'Cx <= 4 x'Mx (its own Rayleigh quotients enter its
+ * quadratic, so K and C need not commute). A contact strains b_i x_i - b_j x_j between two grains' displacements and rotations, so
+ * x'Kx <= 2 sum_i x_i' K_ii x_i, and C likewise: it suffices that twice the largest eigenvalue of every single grain's block
+ * dt^2 K_ii + 2 dt C_ii, neighbours held, is below 4 M_i. Without dashpots that gives W = 4 + 4r and 16r (square), 6 + 6r and
+ * 24r (hexagonal; exact 6 + 2r for r < 1/3), 4 + 8r and 20r (simple cubic) of verification A: met exactly or from below.
+ * Neighbours count from a gap of 5 % of the radii on, because grains arrange themselves anew; a grain with few neighbours is given a
+ * square (cubic) surrounding of its equals. */
 #include <math.h>
 #include <string.h>
 
@@ -54,13 +56,31 @@ static void add_contact(int dim, const double n[3], double kn, double kt, double
     }
 }
 
-/* Neighbours of grain i within 5 % of touching, through all images. Returns their number. */
-static int add_neighbours(const RveScene *scene, const RvePacking *packing, const double inverse[9], int i, double radius_max,
-                          double r_over, double block[MOTIONS][MOTIONS]) {
+/* Contacts of one grain. */
+enum { MOST_CONTACTS = 256 }; /* a small grain among large ones has few, a large one among grains of 1/40 of its size 250 */
+typedef struct Surrounding {
+  int contacts;
+  double normal[MOST_CONTACTS][3];
+  double effective_mass[MOST_CONTACTS]; /* kg */
+} Surrounding;
+
+static double grain_mass(const RveScene *scene, double r) {
+  const double pi = 3.14159265358979323846;
+  return scene->density * (scene->grain == RVE_DISK ? pi * r * r * scene->thickness : 4.0 / 3.0 * pi * r * r * r);
+}
+
+static void add_neighbour(Surrounding *around, const double n[3], double effective_mass) {
+  if (around->contacts == MOST_CONTACTS) return;
+  memcpy(around->normal[around->contacts], n, 3 * sizeof *n);
+  around->effective_mass[around->contacts++] = effective_mass;
+}
+
+/* Neighbours of grain i within 5 % of touching, through all images. */
+static void find_neighbours(const RveScene *scene, const RvePacking *packing, const double inverse[9], int i, double radius_max,
+                            Surrounding *around) {
   const int dim = scene->dimension;
-  const double *h = packing->cell, reach = 1.05 * (packing->radius[i] + radius_max);
+  const double *h = packing->cell, reach = 1.05 * (packing->radius[i] + radius_max), mass = grain_mass(scene, packing->radius[i]);
   double window[3] = {0.0, 0.0, 0.0};
-  int found = 0;
   for (int k = 0; k < dim; k++) window[k] = reach * sqrt(inverse[3 * k] * inverse[3 * k] + inverse[3 * k + 1] * inverse[3 * k + 1] +
                                                         inverse[3 * k + 2] * inverse[3 * k + 2]);
   for (int j = 0; j < packing->grains; j++) {
@@ -76,48 +96,52 @@ static int add_neighbours(const RveScene *scene, const RvePacking *packing, cons
             d[k] = h[3 * k] * (x[0] + px) + h[3 * k + 1] * (x[1] + py) + h[3 * k + 2] * (x[2] + pz);
           const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
           if (!(length < touch && length > 0.0)) continue;
-          const double n[3] = {d[0] / length, d[1] / length, d[2] / length};
-          add_contact(dim, n, scene->normal_stiffness, scene->tangential_stiffness, r_over, block);
-          found++;
+          const double n[3] = {d[0] / length, d[1] / length, d[2] / length}, other = grain_mass(scene, packing->radius[j]);
+          add_neighbour(around, n, mass * other / (mass + other));
         }
   }
-  return found;
+  if (around->contacts >= 2 * dim) return;
+  around->contacts = 0;
+  for (int k = 0; k < dim; k++) {
+    double n[3] = {0.0, 0.0, 0.0};
+    n[k] = 1.0;
+    for (int side = 0; side < 2; side++, n[k] = -n[k]) add_neighbour(around, n, 0.5 * mass);
+  }
 }
 
-/* W kn of one grain: 2 times the largest eigenvalue of its block. */
-static double grain_stiffness(const RveScene *scene, const RvePacking *packing, const double inverse[9], int i, double radius_max) {
-  const int dim = scene->dimension;
+/* Twice the largest eigenvalue of dt^2 K_ii + 2 dt C_ii, over 4 m: above 1 is unstable. */
+static double grain_excess(const RveScene *scene, const Surrounding *around, double mass, double dt) {
   const double r_over = scene->rotation ? 1.0 / sqrt(scene->grain == RVE_DISK ? 0.5 : 0.4) : 0.0;
   double block[MOTIONS][MOTIONS];
   memset(block, 0, sizeof block);
-  if (add_neighbours(scene, packing, inverse, i, radius_max, r_over, block) < 2 * dim) {
-    memset(block, 0, sizeof block);
-    for (int k = 0; k < dim; k++) {
-      double n[3] = {0.0, 0.0, 0.0};
-      n[k] = 1.0;
-      for (int side = 0; side < 2; side++, n[k] = -n[k])
-        add_contact(dim, n, scene->normal_stiffness, scene->tangential_stiffness, r_over, block);
-    }
+  for (int c = 0; c < around->contacts; c++) {
+    const double m = around->effective_mass[c];
+    const double cn = scene->normal_viscosity * m + 2.0 * scene->critical_damping * sqrt(m * scene->normal_stiffness);
+    const double ct = scene->tangential_stiffness > 0.0 ? scene->tangential_viscosity * m : 0.0;
+    add_contact(scene->dimension, around->normal[c], dt * (dt * scene->normal_stiffness + 2.0 * cn),
+                dt * (dt * scene->tangential_stiffness + 2.0 * ct), r_over, block);
   }
-  return 2.0 * largest_eigenvalue(dim == 2 ? 3 : 6, block);
+  return 0.5 * largest_eigenvalue(scene->dimension == 2 ? 3 : 6, block) / mass;
 }
 
 double rve_critical_time_step(const RveScene *scene, const RvePacking *packing) {
-  double inverse[9], radius_max = 0.0, frequency2 = 0.0, damping = 0.0;
+  double inverse[9], radius_max = 0.0, critical = HUGE_VAL;
   tensor_inverse(packing->cell, inverse);
   for (int i = 0; i < packing->grains; i++) radius_max = fmax(radius_max, packing->radius[i]);
   for (int i = 0; i < packing->grains; i++) {
-    const double r = packing->radius[i], pi = 3.14159265358979323846;
-    const double volume = scene->grain == RVE_DISK ? pi * r * r * scene->thickness : 4.0 / 3.0 * pi * r * r * r;
-    const double mass = scene->density * volume;
-    frequency2 = fmax(frequency2, grain_stiffness(scene, packing, inverse, i, radius_max) / mass);
-    /* Dashpots: c/k of a contact with an equal grain; those with smaller ones are no stiffer. */
-    const double effective = 0.5 * mass, kt = scene->tangential_stiffness;
-    const double cn = scene->normal_viscosity * effective + 2.0 * scene->critical_damping * sqrt(effective * scene->normal_stiffness);
-    damping = fmax(damping, cn / scene->normal_stiffness);
-    if (kt > 0.0) damping = fmax(damping, scene->tangential_viscosity * effective / kt);
+    const double mass = grain_mass(scene, packing->radius[i]);
+    Surrounding around;
+    around.contacts = 0;
+    find_neighbours(scene, packing, inverse, i, radius_max, &around);
+    if (critical == HUGE_VAL) critical = 2.0 * sqrt(mass / scene->normal_stiffness); /* no block is softer than one contact */
+    double high = critical, low = 0.0;
+    if (grain_excess(scene, &around, mass, high) <= 1.0) continue;
+    for (int round = 0; round < 60 && high - low > 1e-14 * high; round++) {
+      const double middle = 0.5 * (low + high);
+      if (grain_excess(scene, &around, mass, middle) <= 1.0) low = middle;
+      else high = middle;
+    }
+    critical = low;
   }
-  /* Leapfrog with the damping force half a step late: (w dt)^2 + 2 (c/k) w^2 dt <= 4. */
-  const double lag = damping * frequency2;
-  return (sqrt(lag * lag + 4.0 * frequency2) - lag) / frequency2;
+  return critical;
 }

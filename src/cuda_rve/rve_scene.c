@@ -18,7 +18,7 @@ RveScene rve_scene_default(void) {
   scene.rotation = 1;
   scene.bond_shear_ratio = 0.5;
   scene.bond_melting_temperature = INFINITY;
-  scene.time_step_fraction = 0.25;
+  scene.time_step_fraction = 0.5;
   return scene;
 }
 
