@@ -26,6 +26,7 @@ typedef struct Keyword {
   const char *name;
   ValueKind kind;
   void *value[2]; /* one or two values follow the keyword */
+  int required;
   int met;
 } Keyword;
 
@@ -68,6 +69,9 @@ static BaseStatus parse(int count, char **text, Keyword *table, int keywords) {
     for (int k = 0; k < values; k++) TRY(parse_value(keyword, keyword->value[k], text[at + 1 + k]));
     at += values + 1;
   }
+  for (int k = 0; k < keywords; k++)
+    if (table[k].required && !table[k].met)
+      return base_error(BASE_ERROR_ARGUMENT, "keyword %s is missing", table[k].name);
   return BASE_OK;
 }
 
@@ -120,24 +124,26 @@ static BaseStatus run_generate(const char *file, int count, char **text) {
   RveGenerator generator = rve_generator_default();
   int max_steps = (int)generator.max_steps;
   Keyword table[] = {
-      {"dimension", VALUE_INTEGER, {&scene.dimension, NULL}, 0},
-      {"grain", VALUE_GRAIN, {&scene.grain, NULL}, 0},
-      {"thickness", VALUE_REAL, {&scene.thickness, NULL}, 0},
-      {"density", VALUE_REAL, {&scene.density, NULL}, 0},
-      {"kn", VALUE_REAL, {&scene.normal_stiffness, NULL}, 0},
-      {"kt", VALUE_REAL, {&scene.tangential_stiffness, NULL}, 0},
-      {"grains", VALUE_INTEGER, {&generator.grains, NULL}, 0},
-      {"radius", VALUE_REAL, {&generator.radius_min, &generator.radius_max}, 0},
-      {"pressure", VALUE_REAL, {&generator.pressure, NULL}, 0},
-      {"preparation_friction", VALUE_REAL, {&generator.preparation_friction, NULL}, 0},
-      {"solid_fraction", VALUE_REAL, {&generator.solid_fraction, NULL}, 0},
-      {"stress_tolerance", VALUE_REAL, {&generator.stress_tolerance, NULL}, 0},
-      {"unbalanced_tolerance", VALUE_REAL, {&generator.unbalanced_tolerance, NULL}, 0},
-      {"max_steps", VALUE_INTEGER, {&max_steps, NULL}, 0},
-      {"seed", VALUE_SEED, {&generator.seed, NULL}, 0},
+      {"dimension", VALUE_INTEGER, {&scene.dimension, NULL}, 0, 0},
+      {"grain", VALUE_GRAIN, {&scene.grain, NULL}, 0, 0},
+      {"thickness", VALUE_REAL, {&scene.thickness, NULL}, 0, 0},
+      {"density", VALUE_REAL, {&scene.density, NULL}, 1, 0},
+      {"kn", VALUE_REAL, {&scene.normal_stiffness, NULL}, 1, 0},
+      {"kt", VALUE_REAL, {&scene.tangential_stiffness, NULL}, 1, 0},
+      {"grains", VALUE_INTEGER, {&generator.grains, NULL}, 0, 0},
+      {"radius", VALUE_REAL, {&generator.radius_min, &generator.radius_max}, 1, 0},
+      {"pressure", VALUE_REAL, {&generator.pressure, NULL}, 1, 0},
+      {"preparation_friction", VALUE_REAL, {&generator.preparation_friction, NULL}, 1, 0},
+      {"solid_fraction", VALUE_REAL, {&generator.solid_fraction, NULL}, 0, 0},
+      {"stress_tolerance", VALUE_REAL, {&generator.stress_tolerance, NULL}, 0, 0},
+      {"unbalanced_tolerance", VALUE_REAL, {&generator.unbalanced_tolerance, NULL}, 0, 0},
+      {"max_steps", VALUE_INTEGER, {&max_steps, NULL}, 0, 0},
+      {"seed", VALUE_SEED, {&generator.seed, NULL}, 0, 0},
   };
   TRY(parse(count, text, table, (int)(sizeof table / sizeof *table)));
   generator.max_steps = max_steps;
+  if (scene.dimension == 2 && isnan(scene.thickness))
+    return base_error(BASE_ERROR_ARGUMENT, "keyword thickness is missing (required in 2D)");
   if (scene.dimension == 3 && !table[1].met) scene.grain = RVE_SPHERE;
   RvePacking packing = {0};
   const double start = base_seconds();
@@ -154,9 +160,8 @@ static BaseStatus run_generate(const char *file, int count, char **text) {
 static BaseStatus run_read(const char *in, const char *out, int count, char **text) {
   int dimension = 0;
   double kt = 0.0;
-  Keyword table[] = {{"dimension", VALUE_INTEGER, {&dimension, NULL}, 0}, {"kt", VALUE_REAL, {&kt, NULL}, 0}};
+  Keyword table[] = {{"dimension", VALUE_INTEGER, {&dimension, NULL}, 1, 0}, {"kt", VALUE_REAL, {&kt, NULL}, 0, 0}};
   TRY(parse(count, text, table, 2));
-  if (!table[0].met) return base_error(BASE_ERROR_ARGUMENT, "keyword dimension is missing; dimension 2 or 3 is needed");
   if (kt < 0.0) return base_error(BASE_ERROR_ARGUMENT, "kt = %g (allowed: >= 0)", kt);
   RvePacking packing = {0};
   TRY(rve_packing_read_history(in, dimension, kt, &packing));

@@ -194,11 +194,15 @@ static BaseStatus read_any(const PackingFile *file, int dimension, double tangen
   return BASE_OK;
 }
 
+static BaseStatus check_dimension(const PackingFile *file, int dimension) {
+  if (dimension == 2 || dimension == 3) return BASE_OK;
+  return base_error(BASE_ERROR_ARGUMENT, "packing file %s: dimension %d; 2 or 3 is allowed", file->name, dimension);
+}
+
 BaseStatus packing_read_bytes(const PackingFile *file, int dimension, double tangential_stiffness,
                               RvePacking *packing) {
   *packing = (RvePacking){0};
-  if (dimension != 2 && dimension != 3)
-    return base_error(BASE_ERROR_ARGUMENT, "packing file %s: dimension %d; 2 or 3 is allowed", file->name, dimension);
+  TRY(check_dimension(file, dimension));
   const BaseStatus status = read_any(file, dimension, tangential_stiffness, packing);
   if (status != BASE_OK) rve_packing_destroy(packing);
   return status;
@@ -208,6 +212,7 @@ BaseStatus rve_packing_read_history(const char *name, int dimension, double tang
   char *bytes = NULL;
   PackingFile file = {.name = name};
   *packing = (RvePacking){0};
+  TRY(check_dimension(&file, dimension));
   TRY(load(name, &bytes, &file.size));
   file.bytes = bytes;
   const BaseStatus status = packing_read_bytes(&file, dimension, tangential_stiffness, packing);
