@@ -28,12 +28,12 @@ def energies(table):
     """Terms of the energy ledger, J per metre of depth, changes since the start."""
     change = lambda name: table[name] - table[name][0]
     return {
-        "potential": change("f_mpm[6]"),
-        "kinetic": change("f_mpm[5]"),
-        "stored in the grains": change("f_mpm[7]"),
-        "grain friction (heat)": change("f_mpm[9]"),
-        "grain damping": change("f_mpm[13]"),
-        "wall friction": change("f_floor[6]"),
+        "potential": change("mpm[6]"),
+        "kinetic": change("mpm[5]"),
+        "stored in the grains": change("mpm[7]"),
+        "grain friction (heat)": change("mpm[9]"),
+        "grain damping": change("mpm[13]"),
+        "wall friction": change("floor[6]"),
     }
 
 
@@ -44,8 +44,8 @@ def momentum_error(case, table):
         return np.nan
     count = min(len(impulses), len(table["Step"]) - 1)
     duration = np.diff(table["Time"])[:count]
-    weight = np.array([0.0, -9.8 * table["f_mpm[1]"][0]])
-    momentum = np.stack([table["f_mpm[2]"], table["f_mpm[3]"]], axis=1)
+    weight = np.array([0.0, -9.8 * table["mpm[1]"][0]])
+    momentum = np.stack([table["mpm[2]"], table["mpm[3]"]], axis=1)
     walls = impulses[:count, 1:3] + impulses[:count, 3:5]
     expected = momentum[0] + np.cumsum((walls + weight) * duration[:, None], axis=0)
     return np.max(np.abs(momentum[1:count + 1] - expected)) / np.max(np.abs(momentum))
@@ -57,19 +57,19 @@ def report(case, grains):
     for line in (OUT / f"log.{case}").read_text(errors="replace").splitlines():
         if line.strip().endswith("atoms") and line.split()[0].isdigit():
             points = int(line.split()[0])
-    seconds, steps = table["CPU"][-1], table["f_mpm[12]"][-1] - table["f_mpm[12]"][0]
+    seconds, steps = table["CPU"][-1], table["mpm[12]"][-1] - table["mpm[12]"][0]
     ledger = energies(table)
     released = max(-ledger["potential"].min(), 1e-30)
     balance = sum(values[-1] for values in ledger.values())
-    width = table["c_front"][0]
+    width = table["front"][0]
     print(f"{case}: {table['Time'][-1] - table['Time'][0]:.2f} s of collapse, {points} points x {grains} grains = "
           f"{points * grains} grains, {seconds:.0f} s wall, {steps / max(seconds, 1e-9) / 1e6:.0f} million particle-steps/s")
-    print(f"  front {width:.2f} -> {table['c_front'].max():.2f} m, runout (L - L0)/L0 = "
-          f"{(table['c_front'].max() - width) / width:.2f}, largest kinetic energy {table['f_mpm[5]'].max():.0f} J/m")
+    print(f"  front {width:.2f} -> {table['front'].max():.2f} m, runout (L - L0)/L0 = "
+          f"{(table['front'].max() - width) / width:.2f}, largest kinetic energy {table['mpm[5]'].max():.0f} J/m")
     for name, values in ledger.items():
         print(f"  {name:24s} {values[-1]:10.1f} J/m  {100 * values[-1] / released:7.2f} % of the released potential energy")
     print(f"  {'sum':24s} {balance:10.1f} J/m  {100 * balance / released:7.2f} % (minus what the FLIP/PIC blend dissipates)")
-    print(f"  heat through the hot wall {table['f_left[7]'][-1]:.1f} J/m, momentum against impulses "
+    print(f"  heat through the hot wall {table['left[7]'][-1]:.1f} J/m, momentum against impulses "
           f"{momentum_error(case, table):.1e}")
 
 
