@@ -34,12 +34,12 @@ MPM_INLINE void mpm_deform_space(const double l[9], double dt, double f[9]) {
   for (int k = 0; k < 9; k++) a[k] = l[k] * dt, size = fmax(size, fabs(a[k]));
   if (3.0 * size < 0.02) {
     /* The norm is at most 3 size = x; terms end where x^(n+1) / (n+1)! < 1e-17: n = 4 for x < 1e-3, else 8. */
-    int order = 3.0 * size < 1e-3 ? 4 : 8;
-    tensor_identity(e);
-    for (; order > 0; order--) {
+    static const double inverse[9] = {1.0, 1.0, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8};
+    const int order = 3.0 * size < 1e-3 ? 4 : 8;
+    for (int k = 0; k < 9; k++) e[k] = inverse[order] * a[k] + (k % 4 == 0 ? 1.0 : 0.0);
+    for (int n = order - 1; n > 0; n--) {
       tensor_multiply(a, e, product);
-      for (int k = 0; k < 9; k++) e[k] = product[k] / order;
-      e[0] += 1.0, e[4] += 1.0, e[8] += 1.0;
+      for (int k = 0; k < 9; k++) e[k] = inverse[n] * product[k] + (k % 4 == 0 ? 1.0 : 0.0);
     }
   } else {
     tensor_exponential(l, dt, e);
