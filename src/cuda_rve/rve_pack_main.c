@@ -12,7 +12,7 @@ static const char usage[] =
     "dempm-pack generate FILE keyword values ...   a packing by isotropic compression\n"
     "  required: radius MIN MAX [m]  pressure P [Pa]  preparation_friction MU  density RHO [kg/m3]  kn K  kt K [N/m]\n"
     "            thickness Z [m] (2D only)\n"
-    "  optional: dimension 2|3 (2)  grain disk|sphere (2D: disk)  grains N (400)  seed S (1)\n"
+    "  optional: dimension 2|3 (2)  grain disk|sphere (2D: disk)  grains N (400)  seed S (5)\n"
     "            solid_fraction F (of the initial gas; 0.74 in 2D, 0.35 in 3D)  stress_tolerance T (1e-3)\n"
     "            unbalanced_tolerance T (1e-3)  max_steps N (2000000)\n"
     "dempm-pack convert IN OUT dimension 2|3 [kt K]   IN: LIGGGHTS data file, text dump, restart, or a packing of "
