@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The material point method core: points, background grid, transfers, walls, step order. One source for 2D and 3D.
  *
- * Determinism. Every sum over points at a node runs in the order (cell, tag), whatever the order of the caller's arrays, the number of
- * threads or of ranks: a rank holds copies ("halo points") of all foreign points that share a node with one of its own, so each
- * node it needs is summed completely, in the same order as on every other rank. Grid fields are then equal bit for bit. */
+ * Determinism. Every sum over points at a node runs in the order (cell, tag), whatever the order of the caller's
+ * arrays, the number of threads or of ranks: a rank holds copies ("halo points") of all foreign points that share a
+ * node with one of its own, so each node it needs is summed completely, in the same order as on every other rank. Grid
+ * fields are then equal bit for bit. */
 #ifndef DEMPM_MPM_H
 #define DEMPM_MPM_H
 
@@ -13,8 +14,10 @@
 extern "C" {
 #endif
 
-typedef enum MpmShape { MPM_SHAPE_LINEAR, MPM_SHAPE_GIMP, MPM_SHAPE_BSPLINE } MpmShape; /* GIMP = uGIMP; BSPLINE quadratic */
-typedef enum MpmTransfer { MPM_TRANSFER_FLIP, MPM_TRANSFER_APIC, MPM_TRANSFER_XPIC } MpmTransfer; /* FLIP blends PIC by pic_fraction */
+/* GIMP = uGIMP; BSPLINE: quadratic. */
+typedef enum MpmShape { MPM_SHAPE_LINEAR, MPM_SHAPE_GIMP, MPM_SHAPE_BSPLINE } MpmShape;
+/* FLIP blends PIC by pic_fraction. */
+typedef enum MpmTransfer { MPM_TRANSFER_FLIP, MPM_TRANSFER_APIC, MPM_TRANSFER_XPIC } MpmTransfer;
 typedef enum MpmOrder { MPM_ORDER_USF, MPM_ORDER_USL, MPM_ORDER_MUSL } MpmOrder;
 
 typedef struct MpmScene {
@@ -32,19 +35,20 @@ typedef struct MpmScene {
   double grid_damping;    /* alpha_g, 1/s */
   int thermal;            /* 1: heat is transported */
   int mechanical;         /* 1 (default); 0: thermal only, points do not move */
-  double mass_cutoff;     /* nodes below this fraction of their largest point's mass move with the points' field but carry no force; default 1e-30 */
+  double mass_cutoff;     /* nodes below this fraction of their largest point's mass move with the points' field but
+                           * carry no force; default 1e-30 */
   int threads;            /* 0 = OpenMP's own choice */
 } MpmScene;
 MpmScene mpm_scene_default(void);
 BaseStatus mpm_scene_check(const MpmScene *scene);
 
-/* The state of one material point, as the caller (a LIGGGHTS fix, a test) keeps it and hands it over at each step. Array of
- * structures on the outside; the core keeps its own structure of arrays, sorted by cell. */
+/* The state of one material point, as the caller (a LIGGGHTS fix, a test) keeps it and hands it over at each step.
+ * Array of structures on the outside; the core keeps its own structure of arrays, sorted by cell. */
 typedef struct MpmPoint {
   int64_t tag;                  /* global identity, > 0, unique */
   double position[3];           /* m */
   double velocity[3];           /* m/s */
-  double force[3];              /* external force on the point, N (gravity and whatever fixes added); 2D: per unit depth */
+  double force[3];              /* external, N (gravity and whatever fixes added); 2D: per unit depth */
   double mass;                  /* kg (2D: per metre of depth) */
   double volume0;               /* m3 (2D: m2 times unit depth), undeformed; current volume = volume0 det F */
   double size0[3];              /* edges of the undeformed point domain, m (uGIMP keeps them; 2D: size0[2] = 1) */
@@ -54,7 +58,7 @@ typedef struct MpmPoint {
   double affine[9];             /* APIC matrix: velocity near the point = v + affine (x - x_p), 1/s */
   double temperature;           /* incremental T_p (eq. 28) */
   double temperature_mapped;    /* remapped from the grid (eq. 29): what law and output see */
-  double temperature_law;       /* temperature_mapped that the law saw last: state, keep it with the point (exchange, restart) */
+  double temperature_law;       /* temperature_mapped that the law saw last: state, belongs into exchange and restart */
   double temperature_gradient[3]; /* K/m */
   double heat_capacity;         /* specific, J/(kg K); required if thermal */
   double heat;                  /* W/m3 from the law */
@@ -65,7 +69,7 @@ typedef struct MpmPoint {
 } MpmPoint;
 void mpm_point_default(MpmPoint *point); /* F = I, all else 0 */
 
-/* Walls. A plane keeps the half space its normal points into; a box keeps its outside. Both may move with `velocity`. */
+/* Walls. A plane keeps the half space its normal points into; a box keeps its outside. Both may move at `velocity`. */
 typedef enum MpmWallKind { MPM_WALL_PLANE, MPM_WALL_BOX } MpmWallKind;
 typedef enum MpmWallContact { MPM_WALL_NO_CONTACT, MPM_WALL_NO_SLIP, MPM_WALL_SLIP, MPM_WALL_FRICTION } MpmWallContact;
 typedef enum MpmWallHeat { MPM_WALL_ADIABATIC, MPM_WALL_TEMPERATURE, MPM_WALL_FLUX } MpmWallHeat;
@@ -75,7 +79,7 @@ typedef struct MpmWall {
   double low[3], high[3];      /* box */
   double velocity[3];          /* m/s, of the wall; the caller moves point / low / high */
   MpmWallContact contact;
-  int separable;               /* SLIP, FRICTION: 1 = the body may lift off (default), 0 = glued in the normal direction */
+  int separable;               /* SLIP, FRICTION: 1 = the body may lift off (default), 0 = glued normally */
   double friction;             /* Coulomb coefficient, FRICTION */
   MpmWallHeat heat;
   double temperature;          /* TEMPERATURE */
@@ -89,22 +93,24 @@ typedef struct MpmWall {
 MpmWall mpm_wall_default(void);
 BaseStatus mpm_wall_check(const MpmWall *wall, int dimension, int thermal);
 
-/* Traction on the current outermost layer of points along +axis or -axis (errata A.6): each gets t V_p / h, h its own width. The component
- * along the axis acts along the current normal of the point's face, as a pressure does. */
+/* Traction on the current outermost layer of points along +axis or -axis (errata A.6): each gets t V_p / h, h its own
+ * width. The component along the axis acts along the current normal of the point's face, as a pressure does. */
 typedef struct MpmTraction {
   int axis;            /* 0, 1, 2 */
   int side;            /* +1 or -1: which outermost layer */
   double traction[3];  /* Pa, in global axes */
 } MpmTraction;
 
-/* Copies of foreign points: begin finds whom to send what (once per step, after positions are known), forward repeats the transfer
- * of changed fields. Implemented by the coupling over MPI; NULL = one rank. fields: bit set of MPM_FIELD_*. */
+/* Copies of foreign points: begin finds whom to send what (once per step, after positions are known), forward repeats
+ * the transfer of changed fields. Implemented by the coupling over MPI; NULL = one rank. fields: bit set of
+ * MPM_FIELD_*. */
 enum { MPM_FIELD_STRESS = 1, MPM_FIELD_VELOCITY = 2, MPM_FIELD_HEAT = 4 /* heat, conductivity, temperature */ };
 typedef struct MpmHalo {
   void *content;
-  /* Given own points [own], returns foreign points (and periodic images, positions shifted) within `reach` of this rank's own. The array
-   * stays owned by the halo and valid until the next begin. Collective. */
-  BaseStatus (*begin)(void *content, const MpmPoint *own, int own_count, double reach, const MpmPoint **foreign, int *foreign_count);
+  /* Given own points [own], returns foreign points (and periodic images, positions shifted) within `reach` of this
+   * rank's own. The array stays owned by the halo and valid until the next begin. Collective. */
+  BaseStatus (*begin)(void *content, const MpmPoint *own, int own_count, double reach, const MpmPoint **foreign,
+                      int *foreign_count);
   /* Sends `width` doubles per own point, value [own_count][width], to wherever copies are; writes foreign_value
    * [foreign_count][width]. Collective. */
   BaseStatus (*forward)(void *content, int width, const double *value, double *foreign_value);
@@ -123,13 +129,14 @@ BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count);
 /* One step of dt seconds: P2G, grid, law, G2P in the scene's order. points [count] in and out, order kept. Collective.
  * BASE_ERROR_UNSTABLE names the first (lowest tag) point that is not finite. */
 BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt);
-/* Answers of the law for the initial state (stress of the packing, conductivity, modulus), without stepping. Sets temperature_mapped
- * and temperature_law to temperature: call it once for new points, not for restarted ones. Collective. */
+/* Answers of the law for the initial state (stress of the packing, conductivity, modulus), without stepping. Sets
+ * temperature_mapped and temperature_law to temperature: call it once for new points, not for restarted ones.
+ * Collective. */
 BaseStatus mpm_initialise(Mpm *mpm, MpmPoint *points, int count);
 
-/* Critical time steps of this rank's points, s; INFINITY without points. Mechanical: h / (sqrt(M/rho) + |v|) times half the limit of
- * verification B9 (0.5 for FLIP, PIC, XPIC with USF or MUSL, 0.45 if linear; less for APIC and USL: mpm_critical.c). Thermal:
- * rho c h^2 / (b k_max), b = 2, 10 if linear (eq. 30-31 corrected). */
+/* Critical time steps of this rank's points, s; INFINITY without points. Mechanical: h / (sqrt(M/rho) + |v|) times half
+ * the limit of verification B9 (0.5 for FLIP, PIC, XPIC with USF or MUSL, 0.45 if linear; less for APIC and USL:
+ * mpm_critical.c). Thermal: rho c h^2 / (b k_max), b = 2, 10 if linear (eq. 30-31 corrected). */
 void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, double *mechanical, double *thermal);
 
 /* Sums over this rank's own points (caller reduces over ranks). */
@@ -138,7 +145,7 @@ typedef struct MpmTotals {
 } MpmTotals;
 void mpm_totals(const MpmPoint *points, int count, MpmTotals *totals);
 
-/* The active nodes of the last step, for writers: index of node (i,j,k), position, mass, velocity, temperature, force. */
+/* The active nodes of the last step, for writers. */
 typedef struct MpmGridView {
   int nodes;
   const int *index;          /* [nodes][3] */

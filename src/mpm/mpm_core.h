@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The inside of the MPM core: what its files share. Not for callers.
  *
- * Four-wide records {scalar, x, y, z} carry a scalar field beside a vector field, so that temperature and velocity (heat and force) share each
- * sweep over the nodes; without heat the scalar is 0. */
+ * Four-wide records {scalar, x, y, z} carry a scalar field beside a vector field, so that temperature and velocity
+ * (heat and force) share each sweep over the nodes; without heat the scalar is 0. */
 #ifndef DEMPM_MPM_CORE_H
 #define DEMPM_MPM_CORE_H
 
@@ -11,7 +11,8 @@
 
 typedef double MpmVec __attribute__((vector_size(32))); /* {scalar, x, y, z} */
 
-/* Cells and nodes have global integer indices relative to the scene's origin, packed into one key whose order is (z, y, x). 2D: z = 0. */
+/* Cells and nodes have global integer indices relative to the scene's origin, packed into one key whose order is (z, y,
+ * x). 2D: z = 0. */
 enum { MPM_KEY_BITS = 21, MPM_KEY_BIAS = 1 << 20 };
 #define MPM_KEY_MASK ((UINT64_C(1) << MPM_KEY_BITS) - 1)
 
@@ -45,7 +46,8 @@ typedef struct MpmPoints {
   double *law_velocity_gradient, *law_deformation_gradient, *law_temperature, *law_temperature_rate;
 } MpmPoints;
 
-/* Active nodes: those in the support of a point. cells and nodes are sorted by key. Memory is proportional to them, not to the box. */
+/* Active nodes: those in the support of a point. cells and nodes are sorted by key. Memory is proportional to them, not
+ * to the box. */
 typedef struct MpmGrid {
   int cells, nodes, cell_room, node_room;
   int ranges, range_room;
@@ -137,7 +139,7 @@ void mpm_grid_free(MpmGrid *grid);
 enum { MPM_GRADIENT_VELOCITY = 1, MPM_GRADIENT_TEMPERATURE = 2 };
 void mpm_p2g_momentum(Mpm *mpm, int with_heat, int with_affine);     /* motion, heat -> sum, heat, scale, owned */
 void mpm_p2g_load(Mpm *mpm);                                         /* load -> rate */
-void mpm_g2p_gradient(Mpm *mpm, MpmPoint *points, int what);         /* state -> law's velocity gradient, temperature gradient */
+void mpm_g2p_gradient(Mpm *mpm, MpmPoint *points, int what);         /* state -> velocity, temperature gradient */
 void mpm_g2p_update(Mpm *mpm, MpmPoint *points);                     /* state, rate -> the points' new velocity, ... */
 void mpm_g2p_velocity(Mpm *mpm, const MpmVec *field);                /* field -> gathered */
 
@@ -148,7 +150,8 @@ BaseStatus mpm_extended_velocity(Mpm *mpm);                          /* XPIC: st
 /* The law for own points; with_load also fills their loads, while the points are in the cache. Collective. */
 BaseStatus mpm_law_run(Mpm *mpm, MpmPoint *points, double dt, int with_load);
 void mpm_load_fill(Mpm *mpm, const MpmPoint *points);         /* loads of own points */
-BaseStatus mpm_load_finish(Mpm *mpm, const MpmPoint *points); /* tractions, flux walls, loads of foreign points. Collective */
+/* Tractions, flux walls, loads of foreign points. Collective. */
+BaseStatus mpm_load_finish(Mpm *mpm, const MpmPoint *points);
 
 /* mpm_heat.c */
 void mpm_heat_start(Mpm *mpm);                                       /* nodal temperature, temperature walls */
@@ -161,7 +164,8 @@ void mpm_wall_start(Mpm *mpm);            /* kinematic condition on the nodal ve
 void mpm_wall_update(Mpm *mpm);           /* impulses on the updated velocity; the walls' outputs */
 double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], double normal[3]);
 int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]);
-/* The face of the point's deformed domain that looks most along the normal: area vector, m2, and its projection on the normal. */
+/* The face of the point's deformed domain that looks most along the normal: area vector, m2, and its projection on the
+ * normal. */
 double mpm_face_area(const MpmPoint *point, const double normal[3], double area[3]);
 
 /* mpm_traction.c */

@@ -5,16 +5,17 @@
 #include "../base/tensor.h"
 #include "mpm_core.h"
 
-/* Limit of dt (c + |v|) / h, c = sqrt(M / rho), by shape (linear, uGIMP, B-spline): the smallest over 20 positions of a lattice of points
- * in its cells, with 1 and 2 points per cell and axis, in 2D and 3D, Poisson's ratio 0.2 to 0.45, random velocities, 100 to 1,500 steps
- * without growth of the energy (verification B9). FLIP before or after PIC and XPIC: measured 0.9, 1.6, 1.8, held at 1 so that no wave
- * outruns a cell; APIC 0.2 (its matrix near nodes), 0.7, 0.7; USL: 0.1 (it answers tiny nodal masses with large velocity gradients),
- * 0.5, 0.6. */
+/* Limit of dt (c + |v|) / h, c = sqrt(M / rho), by shape (linear, uGIMP, B-spline): the smallest over 20 positions of a
+ * lattice of points in its cells, with 1 and 2 points per cell and axis, in 2D and 3D, Poisson's ratio 0.2 to 0.45,
+ * random velocities, 100 to 1,500 steps without growth of the energy (verification B9). FLIP before or after PIC and
+ * XPIC: measured 0.9, 1.6, 1.8, held at 1 so that no wave outruns a cell; APIC 0.2 (its matrix near nodes), 0.7, 0.7;
+ * USL: 0.1 (it answers tiny nodal masses with large velocity gradients), 0.5, 0.6. */
 static const double LIMIT[2][2][3] = {{{0.9, 1.0, 1.0}, {0.2, 0.7, 0.7}}, {{0.1, 0.5, 0.6}, {0.1, 0.5, 0.6}}};
 static const double SAFETY = 0.5;
 
-/* dt < rho c h^2 / (b k): measured b = 0.4 to 0.7 with uGIMP and B-spline in 2D and 3D, 2 is given; linear shape functions need 0.9 to
- * 1.3 with 2 or 3 points per cell and axis, but up to 10 with one, where surface nodes hold little capacity. */
+/* dt < rho c h^2 / (b k): measured b = 0.4 to 0.7 with uGIMP and B-spline in 2D and 3D, 2 is given; linear shape
+ * functions need 0.9 to 1.3 with 2 or 3 points per cell and axis, but up to 10 with one, where surface nodes hold
+ * little capacity. */
 static const double THERMAL_B[3] = {10.0, 2.0, 2.0};
 
 /* Largest eigenvalue of a symmetric tensor [6], by the trigonometric form of the cubic's roots. */
@@ -47,7 +48,8 @@ void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, 
       const double conductivity = largest_eigenvalue(point->conductivity);
       const double capacity = point->mass * point->heat_capacity / volume;
       if (conductivity > 0.0)
-        *thermal = fmin(*thermal, capacity * scene->spacing * scene->spacing / (THERMAL_B[scene->shape] * conductivity));
+        *thermal =
+            fmin(*thermal, capacity * scene->spacing * scene->spacing / (THERMAL_B[scene->shape] * conductivity));
     }
   }
 }

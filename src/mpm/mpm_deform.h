@@ -6,8 +6,8 @@
 #include "../base/tensor.h"
 #include "mpm_shape.h"
 
-/* In the plane: exp(A) = e^s (C I + S (A - s I)) with s = tr A / 2, (A - s I)^2 = z I, C = cosh sqrt z, S = sinh sqrt z / sqrt z,
- * whose series in z reach round-off for |z| < 1/16; larger steps take the general way. */
+/* In the plane: exp(A) = e^s (C I + S (A - s I)) with s = tr A / 2, (A - s I)^2 = z I, C = cosh sqrt z, S = sinh sqrt z
+ * / sqrt z, whose series in z reach round-off for |z| < 1/16; larger steps take the general way. */
 MPM_INLINE void mpm_deform_plane(const double l[9], double dt, double f[9]) {
   const double a = l[0] * dt, b = l[1] * dt, c = l[3] * dt, d = l[4] * dt;
   const double s = 0.5 * (a + d), p = 0.5 * (a - d), z = p * p + b * c;

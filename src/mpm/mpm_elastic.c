@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Thermo-elastic law, hypoelastic with the Jaumann rate (TM-DEMPM eq. 50-51 corrected). The old stress is turned by the rotation of the
- * step (Cayley form of the spin, so that it keeps its principal values), the increment C : (D - beta T' I) dt is added. */
+/* Thermo-elastic law, hypoelastic with the Jaumann rate (TM-DEMPM eq. 50-51 corrected). The old stress is turned by the
+ * rotation of the step (Cayley form of the spin, so that it keeps its principal values), the increment C : (D - beta T'
+ * I) dt is added. */
 #include <math.h>
 #include <string.h>
 
@@ -9,7 +10,9 @@
 
 typedef struct Elastic {
   MpmElastic given;
-  double lambda, mu, thermal; /* Pa, Pa, Pa/K: sigma = lambda tr(e) I + 2 mu e - thermal dT I on the active components */
+  /* sigma = lambda tr(e) I + 2 mu e - thermal dT I on the active components. */
+  double lambda, mu; /* Pa */
+  double thermal;    /* Pa/K */
 } Elastic;
 
 /* sigma <- R sigma R^T with R = (I - W/2)^-1 (I + W/2), W the spin times dt. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The background grid: active cells, the nodes of their supports, slabs for threads. Everything is found by linear merges of sorted
- * keys, so that time and memory follow the active nodes. */
+/* The background grid: active cells, the nodes of their supports, slabs for threads. Everything is found by linear
+ * merges of sorted keys, so that time and memory follow the active nodes. */
 #include <string.h>
 
 #include "mpm_core.h"
@@ -42,17 +42,18 @@ static BaseStatus reserve_nodes(MpmGrid *grid, int nodes, int thermal, int exten
 }
 
 void mpm_grid_free(MpmGrid *grid) {
-  void *const memory[] = {grid->cell_key, grid->cell_first, grid->cell_row, grid->index, grid->slab[0], grid->slab[1],
-                          grid->sum, grid->heat, grid->scale, grid->lowest_tag, grid->state, grid->rate, grid->extended, grid->term,
-                          grid->contact_of, grid->view_mass, grid->view_velocity, grid->view_temperature, grid->owned,
-                          grid->dilated[0], grid->dilated[1]};
+  void *const memory[] = {
+      grid->cell_key, grid->cell_first, grid->cell_row,   grid->index,      grid->slab[0],       grid->slab[1],
+      grid->sum,      grid->heat,       grid->scale,      grid->lowest_tag, grid->state,         grid->rate,
+      grid->extended, grid->term,       grid->contact_of, grid->view_mass,  grid->view_velocity, grid->view_temperature,
+      grid->owned,    grid->dilated[0], grid->dilated[1]};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   for (int axis = 0; axis < 3; axis++)
     for (int w = 0; w < MPM_WIDTH_MAX; w++) base_free(grid->position[axis][w]);
   memset(grid, 0, sizeof *grid);
 }
 
-/* *out = sorted union of key[i] + w * stride over w < width; position[axis][w][i] = index of key[i] + w * stride in it. */
+/* dilated[out] = sorted union of key[i] + w * stride, w < width; position[axis][w][i]: the place of each in it. */
 static BaseStatus dilate(MpmGrid *grid, const uint64_t *key, int n, int axis, int width, int out, int *count) {
   const uint64_t stride = UINT64_C(1) << (axis * MPM_KEY_BITS);
   if (n > grid->position_room[axis]) {

@@ -14,8 +14,8 @@ void mpm_heat_start(Mpm *mpm) {
   }
 }
 
-/* rate[0]: W on entry, K/s on return. A temperature wall supplies what keeps its nodes from changing: that is the heat that reaches
- * the points, since they receive increments only (eq. 28). */
+/* rate[0]: W on entry, K/s on return. A temperature wall supplies what keeps its nodes from changing: that is the heat
+ * that reaches the points, since they receive increments only (eq. 28). */
 void mpm_heat_update(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
   for (int c = mpm->contact_count - 1; c >= 0; c--) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* A constitutive law, seen by the MPM core: a batch of points in, stresses out. The core does not know what a grain is. */
+/* A constitutive law, seen by the MPM core: a batch of points in, stresses out. The core knows nothing of grains. */
 #ifndef DEMPM_MPM_LAW_H
 #define DEMPM_MPM_LAW_H
 
@@ -10,8 +10,15 @@ extern "C" {
 #endif
 
 /* Extra values per point that a law reports for output. */
-enum { MPM_LAW_SOLID_FRACTION = 0, MPM_LAW_COORDINATION, MPM_LAW_BOND_FRACTION, MPM_LAW_UNBALANCED,
-       MPM_LAW_ENERGY_DENSITY /* stored elastic + fluctuation energy, J/m3 */, MPM_LAW_DISSIPATION /* W/m3, all kinds */, MPM_LAW_SCALARS };
+enum {
+  MPM_LAW_SOLID_FRACTION = 0,
+  MPM_LAW_COORDINATION,
+  MPM_LAW_BOND_FRACTION,
+  MPM_LAW_UNBALANCED,
+  MPM_LAW_ENERGY_DENSITY, /* stored elastic + fluctuation energy, J/m3 */
+  MPM_LAW_DISSIPATION,    /* W/m3, all kinds */
+  MPM_LAW_SCALARS
+};
 
 /* Arrays of n points, point-major ([n][k]); the law reads the first block and writes the second. */
 typedef struct MpmLawBatch {
@@ -20,7 +27,10 @@ typedef struct MpmLawBatch {
   const int64_t *tag;                 /* [n] the points' global identities */
   const double *velocity_gradient;    /* [n][9] 1/s, row-major */
   const double *deformation_gradient; /* [n][9] F before this step's increment */
-  const double *temperature;          /* [n] at the end of the step; NULL without heat, as are the next and heat, conductivity */
+  const double *temperature;          /* [n] remapped (TM-DEMPM eq. 29), at the end of the law's interval, which is the
+                                       * step with USL and MUSL and, as the stress of USF belongs to the positions it
+                                       * starts from, the step before with USF; NULL without heat, as are the next and
+                                       * heat and conductivity */
   const double *temperature_rate;     /* [n] 1/s */
   double *stress;                     /* [n][6] Cauchy, Pa, tension positive; in: before, out: after the step */
   double *heat;                       /* [n] W/m3 of current volume */
@@ -38,7 +48,12 @@ typedef struct MpmLaw {
   void (*destroy)(void *content);
 } MpmLaw;
 
-typedef enum MpmElasticMode { MPM_ELASTIC_3D, MPM_ELASTIC_PLANE_STRAIN, MPM_ELASTIC_PLANE_STRESS, MPM_ELASTIC_BAR } MpmElasticMode;
+typedef enum MpmElasticMode {
+  MPM_ELASTIC_3D,
+  MPM_ELASTIC_PLANE_STRAIN,
+  MPM_ELASTIC_PLANE_STRESS,
+  MPM_ELASTIC_BAR
+} MpmElasticMode;
 
 typedef struct MpmElastic {
   MpmElasticMode mode;    /* BAR: uniaxial stress along x: sigma_xx = E (eps_xx - beta dT), the rest 0 */

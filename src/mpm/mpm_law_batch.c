@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Between points and constitutive law: the batch, and the loads that its answers put on the grid. The batch follows the caller's order. */
+/* Between points and constitutive law: the batch, and the loads that its answers put on the grid. The batch follows the
+ * caller's order. */
 #include <math.h>
 #include <string.h>
 
@@ -15,7 +16,8 @@ static void fill_batch(Mpm *mpm, const MpmPoint *points, double dt) {
   for (int s = 0; s < p->live; s++) {
     const MpmPoint *point = &points[s];
     p->law_tag[s] = point->tag;
-    memcpy(p->law_deformation_gradient + 9 * (size_t)s, point->deformation_gradient, sizeof point->deformation_gradient);
+    memcpy(p->law_deformation_gradient + 9 * (size_t)s, point->deformation_gradient,
+           sizeof point->deformation_gradient);
     memcpy(batch->stress + 6 * (size_t)s, point->stress, sizeof point->stress);
     if (!has_heat) continue;
     p->law_temperature[s] = point->temperature_mapped;
@@ -51,8 +53,8 @@ static void take_answer(Mpm *mpm, MpmPoint *point, int s, double dt) {
   if (!isfinite(sum)) mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "heat source or conductivity is not finite");
 }
 
-/* load[0]: {W, N} on the point; load[1 + j]: what meets the slope of S along j, {V q_j, -V sigma_ij} (TM-DEMPM eq. 17 corrected, 18),
- * with q = -k grad T; slopes are per unit of x / h, hence 1 / h. */
+/* load[0]: {W, N} on the point; load[1 + j]: what meets the slope of S along j, {V q_j, -V sigma_ij} (TM-DEMPM eq. 17
+ * corrected, 18), with q = -k grad T; slopes are per unit of x / h, hence 1 / h. */
 static void fill_load(const Mpm *mpm, const MpmPoint *point, MpmVec *load) {
   static const int voigt[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
   const int dimension = mpm->scene.dimension;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Shape functions of one axis; products of axes give those of a node. `shape` and `dimension` are constants at every call site, and
- * the functions are always inlined: each combination is compiled by itself, from one source.
+/* Shape functions of one axis; products of axes give those of a node. `shape` and `dimension` are constants at every
+ * call site, and the functions are always inlined: each combination is compiled by itself, from one source.
  *
- * Lengths are in units of the spacing h: u = (x - origin) / h. The support of a point starts at node `base` and has mpm_shape_width()
- * nodes per axis; f = u - base. */
+ * Lengths are in units of the spacing h: u = (x - origin) / h. The support of a point starts at node `base` and has
+ * mpm_shape_width() nodes per axis; f = u - base. */
 #ifndef DEMPM_MPM_SHAPE_H
 #define DEMPM_MPM_SHAPE_H
 
@@ -20,8 +20,8 @@ MPM_INLINE double mpm_shape_anchor(MpmShape shape, double u, double half) {
   return shape == MPM_SHAPE_LINEAR ? u : shape == MPM_SHAPE_BSPLINE ? u - 0.5 : u - half;
 }
 
-/* value[a] = S at node base + a, slope[a] = dS/du. uGIMP: mean of the hat function over [f - half, f + half], half <= 1/2
- * (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity. */
+/* value[a] = S at node base + a, slope[a] = dS/du. uGIMP: mean of the hat function over [f - half, f + half], half <=
+ * 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity. */
 MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double value[MPM_WIDTH_MAX],
                                double slope[MPM_WIDTH_MAX]) {
   if (shape == MPM_SHAPE_LINEAR) {
@@ -45,11 +45,13 @@ MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double val
   }
 }
 
-/* APIC: row[a] such that sum_a row[a] v_a is the slope of v over u around the point: S_a d_a / D with d_a = base + a - u and
- * D = sum S d^2 (B-spline: 1/4). Linear: D = f (1 - f) vanishes at a node and the row would be dS/du there, however little mass the far
- * node has: its velocity (force / mass) then feeds itself and blows up (B7). D is kept above 0.02, so that points within 2 % of a cell from
- * a node lose part of their matrix (0.1 % of the angular momentum of a body in 20 steps). */
-MPM_INLINE void mpm_shape_affine(MpmShape shape, double f, const double value[MPM_WIDTH_MAX], double row[MPM_WIDTH_MAX]) {
+/* APIC: row[a] such that sum_a row[a] v_a is the slope of v over u around the point: S_a d_a / D with d_a = base + a -
+ * u and D = sum S d^2 (B-spline: 1/4). Linear: D = f (1 - f) vanishes at a node and the row would be dS/du there,
+ * however little mass the far node has: its velocity (force / mass) then feeds itself and blows up (B7). D is kept
+ * above 0.02, so that points within 2 % of a cell from a node lose part of their matrix (0.1 % of the angular momentum
+ * of a body in 20 steps). */
+MPM_INLINE void mpm_shape_affine(MpmShape shape, double f, const double value[MPM_WIDTH_MAX],
+                                 double row[MPM_WIDTH_MAX]) {
   const int width = mpm_shape_width(shape);
   double moment = 0.0;
   for (int a = 0; a < width; a++) row[a] = value[a] * (a - f), moment += row[a] * (a - f);

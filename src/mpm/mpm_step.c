@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Creation and the order of a step.
  *
- * Collective calls (halo, law) are made the same number of times on every rank. An error found on one rank alone (a point that
- * is not finite) is remembered; the rank goes on with no points and reports at the end of the step. Errors of the callbacks themselves are
- * the same on all ranks by contract and end the step at once; so does lack of memory, which a caller must treat as fatal. */
+ * Collective calls (halo, law) are made the same number of times on every rank. An error found on one rank alone (a
+ * point that is not finite) is remembered; the rank goes on with no points and reports at the end of the step. Errors
+ * of the callbacks themselves are the same on all ranks by contract and end the step at once; so does lack of memory,
+ * which a caller must treat as fatal. */
 #include <math.h>
 #include <omp.h>
 #include <stdio.h>
@@ -73,7 +74,7 @@ BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count) 
   return BASE_OK;
 }
 
-/* ------------------------------------------------------------------------------------------------------------- errors */
+/* ------------------------------------------------------------------------------------------------------ errors */
 
 void mpm_note_error(Mpm *mpm, BaseStatus status) {
   if (status == BASE_OK || mpm->status != BASE_OK) return;
@@ -112,7 +113,7 @@ static void forget_errors(Mpm *mpm) {
   mpm->point_tag = INT64_MAX;
 }
 
-/* ----------------------------------------------------------------------------------------------------- parts of a step */
+/* --------------------------------------------------------------------------------------------- parts of a step */
 
 /* Points within this distance may share a node with an own point, whatever their place in their cells. */
 static double halo_reach(const MpmScene *scene) {
@@ -126,8 +127,10 @@ static BaseStatus gather_points(Mpm *mpm, const MpmPoint *points, int count) {
   p->own = p->live = count;
   p->foreign = 0;
   if (mpm->halo) {
-    TRY(mpm->halo->begin(mpm->halo->content, points, count, halo_reach(&mpm->scene), &mpm->foreign_points, &p->foreign));
-    if (p->foreign > INT32_MAX - count) return base_error(BASE_ERROR_MEMORY, "more than %d points on a rank", INT32_MAX);
+    TRY(mpm->halo->begin(mpm->halo->content, points, count, halo_reach(&mpm->scene), &mpm->foreign_points,
+                         &p->foreign));
+    if (p->foreign > INT32_MAX - count)
+      return base_error(BASE_ERROR_MEMORY, "more than %d points on a rank", INT32_MAX);
   }
   TRY(mpm_points_reserve(mpm, count + p->foreign));
   p->count = count + p->foreign;
@@ -212,11 +215,12 @@ static BaseStatus renew_state(Mpm *mpm, const MpmPoint *points) {
   return BASE_OK;
 }
 
-/* ----------------------------------------------------------------------------------------------------------- the step */
+/* ---------------------------------------------------------------------------------------------------- the step */
 
 /* USF (TM-DEMPM fig. 3): the law first, with the velocity of the incoming points. */
 static BaseStatus step_law_first(Mpm *mpm, MpmPoint *points) {
-  const int what = (mpm->scene.mechanical ? MPM_GRADIENT_VELOCITY : 0) | (mpm->scene.thermal ? MPM_GRADIENT_TEMPERATURE : 0);
+  const int what =
+      (mpm->scene.mechanical ? MPM_GRADIENT_VELOCITY : 0) | (mpm->scene.thermal ? MPM_GRADIENT_TEMPERATURE : 0);
   mpm_g2p_gradient(mpm, points, what);
   TRY(mpm_law_run(mpm, points, mpm->dt, 1));
   drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
@@ -236,7 +240,8 @@ static BaseStatus step_law_last(Mpm *mpm, MpmPoint *points) {
 }
 
 BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt) {
-  if (!(dt > 0.0 && isfinite(dt))) return base_error(BASE_ERROR_ARGUMENT, "time step is %g; allowed: finite and > 0", dt);
+  if (!(dt > 0.0 && isfinite(dt)))
+    return base_error(BASE_ERROR_ARGUMENT, "time step is %g; allowed: finite and > 0", dt);
   if (count < 0) return base_error(BASE_ERROR_ARGUMENT, "number of points is %d; allowed: >= 0", count);
   forget_errors(mpm);
   mpm->dt = dt;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Traction on the outermost layer of points (errata A.6): a point belongs to it if no other point lies beyond it, seen along the axis within
- * half a point's width to the sides. Its face has the area V / h, h being the point's own width. The normal component of the traction acts
- * along the face's current normal, as a pressure does (a force of fixed direction would turn a body that is free to turn); the
- * tangential components act along their axes. */
+/* Traction on the outermost layer of points (errata A.6): a point belongs to it if no other point lies beyond it, seen
+ * along the axis within half a point's width to the sides. Its face has the area V / h, h being the point's own width.
+ * The normal component of the traction acts along the face's current normal, as a pressure does (a force of fixed
+ * direction would turn a body that is free to turn); the tangential components act along their axes. */
 #include <math.h>
 
 #include "../base/tensor.h"

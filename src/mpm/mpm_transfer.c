@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* P2G and G2P. Each body is written once and compiled for two dimensions x three shapes (see mpm_shape.h).
  *
- * P2G: the points of a cell share their nodes, so a cell is summed in registers and then added to the nodes. Cells go slab by slab, first
- * the slabs of even global index, then the odd ones: the order of the sums at a node is that of (slab colour, cell, tag), for
- * every number of threads and ranks. */
+ * P2G: the points of a cell share their nodes, so a cell is summed in registers and then added to the nodes. Cells go
+ * slab by slab, first the slabs of even global index, then the odd ones: the order of the sums at a node is that of
+ * (slab colour, cell, tag), for every number of threads and ranks. */
 #include <math.h>
 #include <string.h>
 
@@ -47,7 +47,7 @@ MPM_INLINE void find_weights(const MpmPoints *points, int k, const double base[3
   }
 }
 
-/* ---------------------------------------------------------------------------------------------------- P2G, momentum */
+/* ----------------------------------------------------------------------------------------------- P2G, momentum */
 
 MPM_INLINE void add_affine(const Mpm *mpm, int k, const Weights *w, int dimension, int width, MpmVec *sum) {
   const double *affine = mpm->points.affine[k], factor = mpm->points.place[k][3] * mpm->scene.spacing;
@@ -137,7 +137,7 @@ void mpm_p2g_momentum(Mpm *mpm, int with_heat, int with_affine) {
   }
 }
 
-/* -------------------------------------------------------------------------------------------------------- P2G, load */
+/* --------------------------------------------------------------------------------------------------- P2G, load */
 
 MPM_INLINE void load_body(Mpm *mpm, const int range[2], int dimension, MpmShape shape) {
   const MpmPoints *points = &mpm->points;
@@ -186,7 +186,7 @@ void mpm_p2g_load(Mpm *mpm) {
   }
 }
 
-/* --------------------------------------------------------------------------------------------------------- gathers */
+/* ----------------------------------------------------------------------------------------------------- gathers */
 
 MPM_INLINE void gather_value(const MpmVec *field, const int *row, const Weights *w, int dimension, int width,
                              MpmVec *result) {
@@ -234,7 +234,8 @@ MPM_INLINE void gradient_body(Mpm *mpm, MpmPoint *out, int what, const int range
         double *velocity_gradient = points->law_velocity_gradient + 9 * (size_t)slot;
         for (int i = 0; i < 3; i++)
           for (int j = 0; j < 3; j++)
-            velocity_gradient[3 * i + j] = i < dimension && j < dimension ? mpm->inverse_spacing * gradient[j][1 + i] : 0.0;
+            velocity_gradient[3 * i + j] =
+                i < dimension && j < dimension ? mpm->inverse_spacing * gradient[j][1 + i] : 0.0;
       }
       if (what & MPM_GRADIENT_TEMPERATURE)
         for (int j = 0; j < 3; j++)
@@ -290,11 +291,11 @@ void mpm_g2p_velocity(Mpm *mpm, const MpmVec *field) {
   }
 }
 
-/* --------------------------------------------------------------------------------------------------------- G2P, update */
+/* ------------------------------------------------------------------------------------------------- G2P, update */
 
-/* Velocity and position from Sv = sum S v_I, Sa = sum S a_I, and for XPIC Sv* (TM-DEMPM eq. 26-27 corrected: damping rates in 1/s; the
- * position moves by dt Sv + dt/2 times the change of the point's velocity, so uniform motion is exact). APIC moves with the
- * updated grid velocity. */
+/* Velocity and position from Sv = sum S v_I, Sa = sum S a_I, and for XPIC Sv* (TM-DEMPM eq. 26-27 corrected: damping
+ * rates in 1/s; the position moves by dt Sv + dt/2 times the change of the point's velocity, so uniform motion is
+ * exact). APIC moves with the updated grid velocity. */
 MPM_INLINE void update_motion(const Mpm *mpm, MpmPoint *point, const MpmVec *value, const MpmVec *rate,
                               const MpmVec *extended) {
   const MpmScene *scene = &mpm->scene;

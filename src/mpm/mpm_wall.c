@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Walls as conditions on nodal velocities. Nodes at or beyond a wall (to round-off) are under its condition.
  *
- * The condition is applied twice. Before the update to v_I alone, so that the velocity gradient respects the wall; the FLIP points do not
- * feel that change. Then to v_I + a_I dt, as impulses: they are what the points feel. Several walls at one node: the impulses are
- * iterated (projected Gauss-Seidel). */
+ * The condition is applied twice. Before the update to v_I alone, so that the velocity gradient respects the wall; the
+ * FLIP points do not feel that change. Then to v_I + a_I dt, as impulses: they are what the points feel. Several walls
+ * at one node: the impulses are iterated (projected Gauss-Seidel). */
 #include <math.h>
 #include <string.h>
 
@@ -19,8 +19,9 @@ int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]) {
   return 1;
 }
 
-/* Distance of x from a box: outside the largest distance along an axis, inside minus the depth under the nearest face, whose normal is
- * returned. `preferred` (or NULL) decides between faces that are equally near: the one that it runs into most. */
+/* Distance of x from a box: outside the largest distance along an axis, inside minus the depth under the nearest face,
+ * whose normal is returned. `preferred` (or NULL) decides between faces that are equally near: the one that it runs
+ * into most. */
 static double box_distance(const MpmWall *wall, int dimension, const double x[3], const double *preferred,
                            double tolerance, double normal[3]) {
   double best = -INFINITY, best_speed = 0.0;
@@ -107,8 +108,8 @@ BaseStatus mpm_wall_find(Mpm *mpm) {
   return BASE_OK;
 }
 
-/* change = what the wall does to a node that moves with `free` relative to it. Coulomb in impulse form: the tangential impulse
- * is at most friction times the normal one. */
+/* change = what the wall does to a node that moves with `free` relative to it. Coulomb in impulse form: the tangential
+ * impulse is at most friction times the normal one. */
 static void respond(const MpmWall *wall, const double normal[3], const double free[3], int with_friction,
                     double change[3]) {
   for (int i = 0; i < 3; i++) change[i] = 0.0;
@@ -163,8 +164,8 @@ void mpm_wall_start(Mpm *mpm) {
   iterate(mpm, mpm->grid.state, 0);
 }
 
-/* Force on the body, and the power of slip: minus impulse times the mean of the node's velocities before and after the step, which
- * is the wall's share of the change of kinetic energy while all forces act at once. */
+/* Force on the body, and the power of slip: minus impulse times the mean of the node's velocities before and after the
+ * step, which is the wall's share of the change of kinetic energy while all forces act at once. */
 static void add_outputs(Mpm *mpm, const MpmContact *contact) {
   const MpmScene *scene = &mpm->scene;
   const int n = contact->node;

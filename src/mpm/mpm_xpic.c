@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* XPIC(m): the points get (I - (I - S S+)^m) v_p + dt S a instead of FLIP's v_p + dt S a, S the G2P and S+ the P2G operator (Hammerquist and
- * Nairn 2017). m = 1 is PIC. On the grid: v* = sum_r (-1)^(r+1) C(m, r) (S+ S)^(r-1) v, term by term. */
+/* XPIC(m): the points get (I - (I - S S+)^m) v_p + dt S a instead of FLIP's v_p + dt S a, S the G2P and S+ the P2G
+ * operator (Hammerquist and Nairn 2017). m = 1 is PIC. On the grid: v* = sum_r (-1)^(r+1) C(m, r) (S+ S)^(r-1) v, term
+ * by term. */
 #include "mpm_core.h"
 
 /* Velocities of all sorted points from a nodal field; foreign ones from their owners. Collective. */

@@ -47,7 +47,8 @@ static BaseStatus run(int dimension, MpmShape shape, int cells, int threads) {
   scene.spacing = 1.0 / cells;
   scene.shape = shape;
   scene.threads = threads;
-  const MpmElastic elastic = {.mode = dimension == 3 ? MPM_ELASTIC_3D : MPM_ELASTIC_PLANE_STRAIN, .young = 1000.0, .poisson = 0.3};
+  const MpmElastic elastic = {
+      .mode = dimension == 3 ? MPM_ELASTIC_3D : MPM_ELASTIC_PLANE_STRAIN, .young = 1000.0, .poisson = 0.3};
   MpmLaw law;
   Mpm *mpm;
   MpmPoint *points;
@@ -65,8 +66,8 @@ static BaseStatus run(int dimension, MpmShape shape, int cells, int threads) {
     for (int s = 0; s < steps; s++) TRY(mpm_step(mpm, points, count, dt));
     best = fmax(best, 1e-6 * steps * count / (base_seconds() - start));
   }
-  printf("MPM %dD %-8s %6d points, %d thread(s): %6.2f million point-steps/s (best of 3)\n", dimension, name[shape], count,
-         threads, best);
+  printf("MPM %dD %-8s %6d points, %d thread(s): %6.2f million point-steps/s (best of 3)\n", dimension, name[shape],
+         count, threads, best);
   base_free(points);
   mpm_destroy(mpm);
   law.destroy(law.content);

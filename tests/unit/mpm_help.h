@@ -30,7 +30,8 @@
     if (!(value_ <= limit_)) fail_msg("%s = %.6g exceeds %.6g", #value, value_, limit_); \
   } while (0)
 
-/* A rectangle (box) of points on a regular lattice: `number` points of edge `size` per axis, low corner at `low`. Tags from first_tag. */
+/* A rectangle (box) of points on a regular lattice: `number` points of edge `size` per axis, low corner at `low`. Tags
+ * from first_tag. */
 static inline MpmPoint *make_box(int dimension, const double low[3], const int number[3], double size, double density,
                                  int64_t first_tag, int *count) {
   const int depth = dimension == 3 ? number[2] : 1;

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Verification B3: a column of height H = 50 m under its own weight, at rest. nu = 0 and no motion to the sides: the state is uniaxial.
+/* Verification B3: a column of height H = 50 m under its own weight, at rest. nu = 0 and no motion to the sides: the
+ * state is uniaxial.
  *
- * Exact solution for the law used (hypoelastic, Jaumann; in one dimension d sigma/dt = E D, so sigma = E ln(dx/dX)): equilibrium of
- * the material above X gives sigma = -rho0 g (H - X), whatever the law, as the cross-section does not change; then
- * dx/dX = exp(-rho0 g (H - X) / E) and x(X) = E / (rho0 g) (exp(-rho0 g (H - X) / E) - exp(-rho0 g H / E)).
- * E = 1 MPa: 2 % shorter. E = 10 kPa: 50 m become 12.3 m, the lowest points are pressed to 1/55 of their height. */
+ * Exact solution for the law used (hypoelastic, Jaumann; in one dimension d sigma/dt = E D, so sigma = E ln(dx/dX)):
+ * equilibrium of the material above X gives sigma = -rho0 g (H - X), whatever the law, as the cross-section does not
+ * change; then dx/dX = exp(-rho0 g (H - X) / E) and x(X) = E / (rho0 g) (exp(-rho0 g (H - X) / E) - exp(-rho0 g H /
+ * E)). E = 1 MPa: 2 % shorter. E = 10 kPa: 50 m become 12.3 m, the lowest points are pressed to 1/55 of their height.
+ */
 #include "mpm_help.h"
 
 typedef struct Column {
@@ -85,8 +87,8 @@ static void a_soft_column_converges_with_ugimp_but_not_with_linear(void **state)
   const double linear = study(MPM_SHAPE_LINEAR, 1e4, 32, 3, 60.0, 1.0, &last);
   const double worst = last.stress;
   assert_false(linear > 0.0); /* cell crossing: refinement does not help */
-  /* 55-fold compression: the domains of uGIMP keep their size, overlap, and reach through the floor; an error of first order at best
-   * remains there. Its measured slope is 0.65. */
+  /* 55-fold compression: the domains of uGIMP keep their size, overlap, and reach through the floor; an error of first
+   * order at best remains there. Its measured slope is 0.65. */
   AT_MOST(0.5, study(MPM_SHAPE_GIMP, 1e4, 32, 3, 60.0, 1.0, &last));
   AT_MOST(last.stress, 0.02);
   AT_MOST(5.0 * last.stress, worst);

@@ -2,7 +2,7 @@
 /* Bodies in motion: verification B4 (collision), B5 (vibration), B7 (small nodal masses), B9 (stability limit). */
 #include "mpm_help.h"
 
-/* ------------------------------------------------------------------------------------------------------- B4, collision */
+/* ----------------------------------------------------------------------------------------------- B4, collision */
 
 static MpmPoint *make_two_disks(double size, int *count) {
   const int edge = (int)(1.0 / size + 0.5), number[3] = {edge, edge, 1};
@@ -57,7 +57,8 @@ static void two_disks_conserve_momentum_and_bounce(void **state) {
       mpm_totals(points, count, &now);
       largest = fmax(largest, (now.kinetic_energy + energy) / start.kinetic_energy);
     }
-    const double kinetic = now.kinetic_energy / start.kinetic_energy, elastic = elastic_energy(points, count) / start.kinetic_energy;
+    const double kinetic = now.kinetic_energy / start.kinetic_energy,
+                 elastic = elastic_energy(points, count) / start.kinetic_energy;
     double left = 0.0;
     for (int p = 0; p < count; p++)
       if (points[p].position[0] + points[p].position[1] < 1.0) left += points[p].mass * points[p].velocity[0];
@@ -74,9 +75,10 @@ static void two_disks_conserve_momentum_and_bounce(void **state) {
   }
 }
 
-/* ------------------------------------------------------------------------------------------------------- B5, vibration */
+/* ----------------------------------------------------------------------------------------------- B5, vibration */
 
-/* Bar fixed at x = 0, free at L: v = v0 sin(pi x / 2L), omega = pi c / 2L (mode 1). One row of points between slip walls. */
+/* Bar fixed at x = 0, free at L: v = v0 sin(pi x / 2L), omega = pi c / 2L (mode 1). One row of points between slip
+ * walls. */
 static void a_bar_keeps_frequency_and_energy(void **state) {
   (void)state;
   const double length = 25.0, young = 100.0, v0 = 0.1, h = 0.5, dt = 0.01;
@@ -123,7 +125,7 @@ static void a_bar_keeps_frequency_and_energy(void **state) {
   law.destroy(law.content);
 }
 
-/* ----------------------------------------------------------------------------------------------------- B7, small mass */
+/* ---------------------------------------------------------------------------------------------- B7, small mass */
 
 /* The outermost column of points reaches a share s of a cell past a node, whose mass then is tiny. */
 static void tiny_nodal_masses_leave_velocities_bounded(void **state) {
@@ -162,14 +164,15 @@ static void tiny_nodal_masses_leave_velocities_bounded(void **state) {
           law.destroy(law.content);
         }
   printf("small nodal mass: fastest point %.2f of strain times wave speed\n", worst);
-  /* A free surface under pressure p leaves with p/(rho c) = strain times wave speed, a corner with up to sqrt(2) of each; noise
-   * of FLIP comes on top. Without bounds the figure is orders of magnitude, or NaN. */
+  /* A free surface under pressure p leaves with p/(rho c) = strain times wave speed, a corner with up to sqrt(2) of
+   * each; noise of FLIP comes on top. Without bounds the figure is orders of magnitude, or NaN. */
   AT_MOST(worst, 5.0);
 }
 
-/* ------------------------------------------------------------------------------------------------ B9, stability limit */
+/* ----------------------------------------------------------------------------------------- B9, stability limit */
 
-/* Largest growth of the energy in 300 steps of `factor` times the critical step, over positions of the lattice in its cells. */
+/* Largest growth of the energy in 300 steps of `factor` times the critical step, over positions of the lattice in its
+ * cells. */
 static double find_growth(MpmShape shape, MpmOrder order, MpmTransfer transfer, double factor) {
   double growth = 0.0;
   for (int position = 0; position < 10; position++) {
@@ -213,9 +216,11 @@ static void the_critical_step_is_stable_and_five_times_it_is_not(void **state) {
   for (int shape = 0; shape < 3; shape++)
     for (int order = 0; order < 3; order++)
       for (int transfer = 0; transfer < 3; transfer++) {
-        if (shape == MPM_SHAPE_LINEAR && order == MPM_ORDER_USL) continue; /* unstable at small nodal masses at any step */
+        if (shape == MPM_SHAPE_LINEAR && order == MPM_ORDER_USL)
+          continue; /* unstable at small nodal masses at any step */
         AT_MOST(find_growth((MpmShape)shape, (MpmOrder)order, (MpmTransfer)transfer, 1.0), 1.5);
-        if (shape == MPM_SHAPE_LINEAR && transfer == MPM_TRANSFER_APIC) continue; /* its limit has a margin: 0.2 at 1 point per cell */
+        if (shape == MPM_SHAPE_LINEAR && transfer == MPM_TRANSFER_APIC)
+          continue; /* its limit has a margin: 0.2 at 1 point per cell */
         const double growth = find_growth((MpmShape)shape, (MpmOrder)order, (MpmTransfer)transfer, 5.0);
         assert_false(growth <= 1.5);
       }

@@ -6,8 +6,8 @@
 #include "mpm/mpm_deform.h"
 
 /* One update of one point; stress in and out. */
-static void update(const MpmElastic *elastic, const double l[9], double dt, double heating, double stress[6], double *modulus,
-                   double *energy) {
+static void update(const MpmElastic *elastic, const double l[9], double dt, double heating, double stress[6],
+                   double *modulus, double *energy) {
   MpmLaw law;
   OK(mpm_elastic_create(elastic, &law));
   const int64_t tag = 1;
@@ -30,8 +30,8 @@ static void each_mode_has_its_moduli_and_thermal_stress(void **state) {
   const double gamma = young * beta / (1 - 2 * nu), plane = young * beta / (1 - nu), bar = young * beta;
   const double thermal[4][3] = {{gamma, gamma, gamma}, {gamma, gamma, gamma}, {plane, plane, 0}, {bar, 0, 0}};
   for (int mode = 0; mode < 4; mode++) {
-    const MpmElastic elastic = {.mode = (MpmElasticMode)mode, .young = young, .poisson = mode == 3 ? 0.0 : nu, .expansion = beta,
-                                .thermal = 1};
+    const MpmElastic elastic = {
+        .mode = (MpmElasticMode)mode, .young = young, .poisson = mode == 3 ? 0.0 : nu, .expansion = beta, .thermal = 1};
     double stress[6] = {0}, modulus, energy;
     update(&elastic, strain, 1.0, 0.0, stress, &modulus, &energy);
     for (int i = 0; i < 3; i++) AT_MOST(fabs(stress[i] - stiffness[mode][i] * 1e-3), 1e-17);
@@ -44,12 +44,14 @@ static void each_mode_has_its_moduli_and_thermal_stress(void **state) {
   }
 }
 
-/* One turn in 1,000 steps: the stress comes back, its principal values never change (a first-order spin term gains 2 %). */
+/* One turn in 1,000 steps: the stress comes back, its principal values never change (a first-order spin term gains 2
+ * %). */
 static void stress_turns_with_the_body(void **state) {
   (void)state;
   const MpmElastic elastic = {.mode = MPM_ELASTIC_3D, .young = 1.0, .poisson = 0.3};
   const double axis[3] = {0.6, 0.0, 0.8}, rate = 2.0 * PI / 1000;
-  const double spin[9] = {0, -rate * axis[2], rate * axis[1], rate * axis[2], 0, -rate * axis[0], -rate * axis[1], rate * axis[0], 0};
+  const double spin[9] = {
+      0, -rate * axis[2], rate * axis[1], rate * axis[2], 0, -rate * axis[0], -rate * axis[1], rate * axis[0], 0};
   const double start[6] = {1, -2, 3, 0.5, -0.25, 0.125};
   double stress[6], modulus, energy, first_energy = 0.0;
   memcpy(stress, start, sizeof start);
@@ -62,7 +64,8 @@ static void stress_turns_with_the_body(void **state) {
   for (int k = 0; k < 6; k++) AT_MOST(fabs(stress[k] - start[k]), 4.0 * 1000 * rate * rate * rate / 12);
 }
 
-/* The direction of rotation: a bar under sigma_xx that turns counterclockwise by a quarter carries it as sigma_yy; on the way sigma_xy > 0. */
+/* The direction of rotation: a bar under sigma_xx that turns counterclockwise by a quarter carries it as sigma_yy; on
+ * the way sigma_xy > 0. */
 static void the_jaumann_rate_has_the_right_sense(void **state) {
   (void)state;
   const MpmElastic elastic = {.mode = MPM_ELASTIC_PLANE_STRESS, .young = 1.0, .poisson = 0.3};
@@ -92,7 +95,9 @@ static void deformation_equals_the_exponential_and_does_not_drift(void **state) 
     tensor_exponential(plane, 1.0, e);
     tensor_multiply(e, g, expected);
     mpm_deform_plane(plane, 1.0, g);
-    for (int k = 0; k < 9; k++) AT_MOST(fabs(g[k] - expected[k]), 3e-14 * fmax(1.0, expected[0] * expected[0] + expected[4] * expected[4] + size * 10.0));
+    for (int k = 0; k < 9; k++)
+      AT_MOST(fabs(g[k] - expected[k]),
+              3e-14 * fmax(1.0, expected[0] * expected[0] + expected[4] * expected[4] + size * 10.0));
   }
   double f[9], h[9];
   tensor_identity(f), tensor_identity(h);

@@ -3,7 +3,8 @@
 #include "mpm_help.h"
 
 static Mpm *make_heat(const MpmScene *scene, const double conductivity[6], MpmLaw *law) {
-  MpmElastic elastic = {.mode = scene->dimension == 3 ? MPM_ELASTIC_3D : MPM_ELASTIC_PLANE_STRAIN, .young = 1.0, .thermal = 1};
+  MpmElastic elastic = {
+      .mode = scene->dimension == 3 ? MPM_ELASTIC_3D : MPM_ELASTIC_PLANE_STRAIN, .young = 1.0, .thermal = 1};
   memcpy(elastic.conductivity, conductivity, sizeof elastic.conductivity);
   Mpm *mpm;
   OK(mpm_elastic_create(&elastic, law));
@@ -93,7 +94,8 @@ static void an_insulated_body_keeps_its_heat_and_evens_out(void **state) {
     }
 }
 
-/* A Gaussian that spreads in a large body under a conductivity tensor whose axes are turned by 30 degrees: covariance grows by 2 K t. */
+/* A Gaussian that spreads in a large body under a conductivity tensor whose axes are turned by 30 degrees: covariance
+ * grows by 2 K t. */
 static void a_turned_conductivity_gives_the_turned_answer(void **state) {
   (void)state;
   const double c = cos(PI / 6), s = sin(PI / 6), k1 = 2.0, k2 = 0.5, end = 0.02;
@@ -122,7 +124,8 @@ static void a_turned_conductivity_gives_the_turned_answer(void **state) {
   for (int i = 0; i < 3; i++) {
     const double exact = (i < 2 ? start : 0.0) + 2.0 * conductivity[component[i]] * end;
     printf("turned conductivity: second moment %d is %.6f, exact %.6f\n", i, moment[i] / sum, exact);
-    /* The lumped operator spreads a quadratic field exactly up to the smoothing of eq. 28's remap, of order h^2 per decay time. */
+    /* The lumped operator spreads a quadratic field exactly up to the smoothing of eq. 28's remap, of order h^2 per
+     * decay time. */
     AT_MOST(fabs(moment[i] / sum - exact), 1e-3 * start);
   }
   free(points);
@@ -155,7 +158,8 @@ static void walls_and_sources_balance_the_heat_of_the_body(void **state) {
   }
   mpm_totals(points, count, &totals);
   AT_MOST(fabs(totals.thermal_energy - supplied) / totals.thermal_energy, 1e-12);
-  /* Steady: what comes in leaves through the held wall, and the gradient next to the flux wall is flux / k: 6.67 K/m. */
+  /* Steady: what comes in leaves through the held wall, and the gradient next to the flux wall is flux / k: 6.67 K/m.
+   */
   AT_MOST(fabs(walls[0].heat_flow + 0.4 + 0.01 * count) / 0.4, 2e-2);
   double at_end = 0.0, source = 0.01 * count / 0.2;
   for (int p = 0; p < count; p++)

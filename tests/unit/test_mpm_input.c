@@ -98,7 +98,8 @@ static void wrong_walls_and_tractions_are_refused(void **state) {
 
 static void wrong_elastic_constants_are_refused(void **state) {
   (void)state;
-  const MpmElastic good = {.mode = MPM_ELASTIC_3D, .young = 1.0, .poisson = 0.3, .conductivity = {1, 1, 1, 0, 0, 0}, .thermal = 1};
+  const MpmElastic good = {
+      .mode = MPM_ELASTIC_3D, .young = 1.0, .poisson = 0.3, .conductivity = {1, 1, 1, 0, 0, 0}, .thermal = 1};
   MpmLaw law;
   MpmElastic e = good;
   e.young = 0.0;

@@ -62,7 +62,8 @@ static void slopes_are_the_derivatives_of_the_values(void **state) {
       }
 }
 
-/* uGIMP is the mean of the hat function over the domain (TM-DEMPM eq. 12): midpoint sum with 20,000 pieces, error 1e-9 or less per kink. */
+/* uGIMP is the mean of the hat function over the domain (TM-DEMPM eq. 12): midpoint sum with 20,000 pieces, error 1e-9
+ * or less per kink. */
 static void ugimp_is_the_mean_of_the_hat_function(void **state) {
   (void)state;
   enum { PIECES = 20000 };
@@ -82,7 +83,8 @@ static void ugimp_is_the_mean_of_the_hat_function(void **state) {
     }
 }
 
-/* APIC's rows give the slope of a linear field exactly; linear shape functions away from nodes only (see mpm_shape.h), less there. */
+/* APIC's rows give the slope of a linear field exactly; linear shape functions away from nodes only (see mpm_shape.h),
+ * less there. */
 static void affine_rows_are_exact_for_linear_fields(void **state) {
   (void)state;
   for (int s = 0; s < 3; s++)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* TM-DEMPM 5.1.1: a half space, suddenly heated at its free surface (Danilovskaya). E = rho = c = k = 1, nu = 0, so that the
- * wave speed, the diffusivity and all scales are 1. Exact forms: errata A.4. And the rod of 5.2.1, held at both ends. */
+/* TM-DEMPM 5.1.1: a half space, suddenly heated at its free surface (Danilovskaya). E = rho = c = k = 1, nu = 0, so
+ * that the wave speed, the diffusivity and all scales are 1. Exact forms: errata A.4. And the rod of 5.2.1, held at
+ * both ends. */
 #include "mpm_help.h"
 
 /* sigma / (E beta T1), dimensionless; jump of +1 at t = x. */
@@ -12,7 +13,8 @@ static double exact_stress(double x, double t) {
 
 static double exact_displacement(double x, double t) {
   const double r = sqrt(t), a = 0.5 * x / r;
-  const double smooth = 0.5 * (exp(t - x) * erfc(a - r) - exp(t + x) * erfc(a + r)) - 2.0 * sqrt(t / PI) * exp(-a * a) + x * erfc(a);
+  const double smooth =
+      0.5 * (exp(t - x) * erfc(a - r) - exp(t + x) * erfc(a + r)) - 2.0 * sqrt(t / PI) * exp(-a * a) + x * erfc(a);
   return smooth - (t > x ? exp(t - x) - 1.0 : 0.0);
 }
 
@@ -70,7 +72,8 @@ static void a_heated_half_space_follows_danilovskaya(void **state) {
     const double stress = 0.5 * (points[left].stress[0] + points[right].stress[0]) / (beta * t1);
     const double displacement = (0.5 * (points[left].position[0] + points[right].position[0]) - start) / (beta * t1);
     worst_temperature = fmax(worst_temperature, fabs(temperature - exact_temperature(1.0, t)));
-    if (fabs(t - 1.0) > 0.15) worst_displacement = fmax(worst_displacement, fabs(displacement - exact_displacement(1.0, t)));
+    if (fabs(t - 1.0) > 0.15)
+      worst_displacement = fmax(worst_displacement, fabs(displacement - exact_displacement(1.0, t)));
     error[s / 100] = stress - exact_stress(1.0, t);
     if (t < 0.85) early = fmax(early, fabs(error[s / 100]));
   }
@@ -80,12 +83,14 @@ static void a_heated_half_space_follows_danilovskaya(void **state) {
     for (int q = -20; q <= 20; q++) mean += error[n + q] / 41;
     late = fmax(late, fabs(mean));
   }
-  printf("Danilovskaya at x = 1: largest errors T %.2e of T1, u %.2e, stress %.2e before the front, %.2e behind it on average\n",
-         worst_temperature, worst_displacement, early, late);
+  printf(
+      "Danilovskaya at x = 1: errors T %.2e of T1, u %.2e, stress %.2e before the front, %.2e behind it on average\n",
+      worst_temperature, worst_displacement, early, late);
   AT_MOST(worst_temperature, 0.002);
-  /* The front is a jump of 1. Points in cells of width h carry waves like a lattice of spacing 2 h (P2G then G2P is a mean over
-   * neighbours, omega = sin(k h) / h): the front is 0.1 wide after a way of 50 h and rings behind, with +-0.05, as in the paper (Fig. 5b).
-   * So the stress behind the front is compared as a mean over the period of the ringing. */
+  /* The front is a jump of 1. Points in cells of width h carry waves like a lattice of spacing 2 h (P2G then G2P is a
+   * mean over neighbours, omega = sin(k h) / h): the front is 0.1 wide after a way of 50 h and rings behind, with
+   * +-0.05, as in the paper (Fig. 5b). So the stress behind the front is compared as a mean over the period of the
+   * ringing. */
   AT_MOST(worst_displacement, 0.01); /* |u| reaches 0.38 */
   AT_MOST(early, 0.02);              /* the stress reaches -0.89 */
   AT_MOST(late, 0.02);
@@ -94,8 +99,8 @@ static void a_heated_half_space_follows_danilovskaya(void **state) {
   law.destroy(law.content);
 }
 
-/* 5.2.1, corrected (errata 55-57): a rod of 1 m between fixed ends, T = 0 and 100 there. The space mean of the stress is exact at all
- * times, -E beta times the mean temperature. */
+/* 5.2.1, corrected (errata 55-57): a rod of 1 m between fixed ends, T = 0 and 100 there. The space mean of the stress
+ * is exact at all times, -E beta times the mean temperature. */
 static void a_clamped_rod_has_the_exact_mean_stress(void **state) {
   (void)state;
   const double young = 1.33e7, density = 2650.0, capacity = 1.0, k = 100.0, beta = 1e-4, t2 = 100.0, dt = 1e-4;
@@ -144,8 +149,10 @@ static void a_clamped_rod_has_the_exact_mean_stress(void **state) {
       worst_temperature = fmax(worst_temperature, fabs(points[p].temperature_mapped - temperature) / t2);
     }
   }
-  printf("clamped rod: worst error of the mean stress %.2e, of the temperature %.2e\n", worst_stress, worst_temperature);
-  AT_MOST(worst_temperature, 0.01); /* from t = 0.1 on, when the front is 6 cells wide: 1 point per cell averages over a cell */
+  printf("clamped rod: worst error of the mean stress %.2e, of the temperature %.2e\n", worst_stress,
+         worst_temperature);
+  AT_MOST(worst_temperature,
+          0.01); /* from t = 0.1 on, when the front is 6 cells wide: 1 point per cell averages over a cell */
   AT_MOST(worst_stress, 0.01);
   free(points);
   mpm_destroy(mpm);

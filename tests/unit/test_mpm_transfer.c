@@ -15,6 +15,7 @@ static const Kind kinds[] = {{"FLIP", MPM_TRANSFER_FLIP, 0.0, 1},   {"FLIP 0.1 P
                              {"XPIC(1)", MPM_TRANSFER_XPIC, 0.0, 1}, {"XPIC(2)", MPM_TRANSFER_XPIC, 0.0, 2},
                              {"XPIC(5)", MPM_TRANSFER_XPIC, 0.0, 5}};
 enum { KINDS = sizeof kinds / sizeof *kinds };
+enum { STEPS = 10 /* of the comparisons bit for bit: points change their cells in them */ };
 
 static MpmScene make_scene(int dimension, MpmShape shape, const Kind *kind, MpmOrder order) {
   MpmScene scene = mpm_scene_default();
@@ -76,7 +77,8 @@ static void sum_momenta(const MpmPoint *points, int count, double linear[3], dou
   linear[0] = linear[1] = linear[2] = *angular = 0.0;
   for (int p = 0; p < count; p++) {
     for (int i = 0; i < 3; i++) linear[i] += points[p].mass * points[p].velocity[i];
-    *angular += points[p].mass * (points[p].position[0] * points[p].velocity[1] - points[p].position[1] * points[p].velocity[0]);
+    *angular += points[p].mass *
+                (points[p].position[0] * points[p].velocity[1] - points[p].position[1] * points[p].velocity[0]);
   }
 }
 
@@ -105,8 +107,9 @@ static void linear_momentum_is_kept_by_every_transfer(void **state) {
   }
 }
 
-/* Angular momentum of one step without stress, of a body that rotates: FLIP and APIC keep it, the latter when the matrix is counted;
- * PIC loses a share of order (h/R)^2 per step, XPIC(m) an ever smaller one. The order of merit is the claim. */
+/* Angular momentum of one step without stress, of a body that rotates: FLIP and APIC keep it, the latter when the
+ * matrix is counted; PIC loses a share of order (h/R)^2 per step, XPIC(m) an ever smaller one. The order of merit is
+ * the claim. */
 static double rotation_loss(const Kind *kind, MpmShape shape, int steps) {
   MpmLaw law = elastic_law(MPM_ELASTIC_PLANE_STRAIN, 1e-6, 0.0);
   const MpmScene scene = make_scene(2, shape, kind, MPM_ORDER_USF);
@@ -157,7 +160,8 @@ static void angular_momentum_is_lost_as_each_transfer_promises(void **state) {
   }
 }
 
-/* APIC's conserved quantity (Jiang et al. 2015): sum m x cross v + the moment of the matrices, sum m D (A_21 - A_12), D = h^2/4 for the B-spline. */
+/* APIC's conserved quantity (Jiang et al. 2015): sum m x cross v + the moment of the matrices, sum m D (A_21 - A_12), D
+ * = h^2/4 for the B-spline. */
 static void apic_keeps_angular_momentum_with_its_matrix(void **state) {
   (void)state;
   const Kind apic = kinds[3];
@@ -174,7 +178,8 @@ static void apic_keeps_angular_momentum_with_its_matrix(void **state) {
       for (int s = 0; s < 50; s++) OK(mpm_step(mpm, points, count, 1e-3));
     sum_momenta(points, count, linear, &total[when]);
     for (int p = 0; p < count; p++)
-      total[when] += points[p].mass * 0.25 * scene.spacing * scene.spacing * (points[p].affine[3] - points[p].affine[1]);
+      total[when] +=
+          points[p].mass * 0.25 * scene.spacing * scene.spacing * (points[p].affine[3] - points[p].affine[1]);
   }
   AT_MOST(fabs(total[1] - total[0]), 1e-12); /* of masses and velocities near 1: round-off of 50 steps */
   free(points);
@@ -182,13 +187,18 @@ static void apic_keeps_angular_momentum_with_its_matrix(void **state) {
   law.destroy(law.content);
 }
 
-/* ---------------------------------------------------------------------------------- order of the caller, threads, ranks */
+/* ---------------------------------------------------------------------------------- order of the caller, threads,
+ * ranks */
 
 static MpmPoint *run_reference(const MpmScene *given, int threads, int reversed, int edge, int *count) {
   MpmScene scene = *given;
   scene.threads = threads;
-  MpmElastic elastic = {.mode = scene.dimension == 3 ? MPM_ELASTIC_3D : MPM_ELASTIC_PLANE_STRAIN, .young = 1e5, .poisson = 0.3,
-                        .expansion = 1e-3, .conductivity = {5, 3, 4, 1, 0.5, 0.2}, .thermal = scene.thermal};
+  MpmElastic elastic = {.mode = scene.dimension == 3 ? MPM_ELASTIC_3D : MPM_ELASTIC_PLANE_STRAIN,
+                        .young = 1e5,
+                        .poisson = 0.3,
+                        .expansion = 1e-3,
+                        .conductivity = {5, 3, 4, 1, 0.5, 0.2},
+                        .thermal = scene.thermal};
   MpmLaw law;
   Mpm *mpm;
   OK(mpm_elastic_create(&elastic, &law));
@@ -198,14 +208,15 @@ static MpmPoint *run_reference(const MpmScene *given, int threads, int reversed,
   OK(mpm_set_walls(mpm, &wall, 1));
   MpmPoint *points = make_jittered(scene.dimension, edge, count);
   give_random_velocity(points, *count, scene.dimension);
-  for (int p = 0; p < *count; p++) points[p].temperature = points[p].velocity[0], points[p].force[1] = -9.81 * points[p].mass;
+  for (int p = 0; p < *count; p++)
+    points[p].temperature = points[p].velocity[0], points[p].force[1] = -9.81 * points[p].mass;
   if (reversed)
     for (int p = 0; p < *count / 2; p++) {
       const MpmPoint swap = points[p];
       points[p] = points[*count - 1 - p], points[*count - 1 - p] = swap;
     }
   OK(mpm_initialise(mpm, points, *count));
-  for (int s = 0; s < 20; s++) OK(mpm_step(mpm, points, *count, 5e-4));
+  for (int s = 0; s < STEPS; s++) OK(mpm_step(mpm, points, *count, 5e-4));
   qsort(points, (size_t)*count, sizeof *points, compare_tags);
   mpm_destroy(mpm);
   law.destroy(law.content);
@@ -276,13 +287,14 @@ static BaseStatus halo_forward(void *content, int width, const double *value, do
   halo->shared->value[halo->rank] = value;
 #pragma omp barrier
   for (int f = 0; f < halo->count; f++)
-    memcpy(foreign_value + (size_t)f * (size_t)width, halo->shared->value[1 - halo->rank] + (size_t)halo->index[f] * (size_t)width,
-           (size_t)width * sizeof *value);
+    memcpy(foreign_value + (size_t)f * (size_t)width,
+           halo->shared->value[1 - halo->rank] + (size_t)halo->index[f] * (size_t)width, (size_t)width * sizeof *value);
 #pragma omp barrier
   return BASE_OK;
 }
 
-/* Splits the points at a plane that cuts cells, or by parity of the tag; runs both halves at once; joins them by tag. */
+/* Splits the points at a plane that cuts cells, or by parity of the tag; runs both halves at once; joins them by tag.
+ */
 static MpmPoint *run_on_two_ranks(const MpmScene *scene, int by_parity, int edge, int *count) {
   SharedHalo shared = {0};
   MpmPoint *all = make_jittered(scene->dimension, edge, count), *joined = malloc((size_t)*count * sizeof *joined);
@@ -315,7 +327,7 @@ static MpmPoint *run_on_two_ranks(const MpmScene *scene, int by_parity, int edge
     share[rank] = n;
     for (int p = 0; p < n; p++) own[p].temperature = own[p].velocity[0], own[p].force[1] = -9.81 * own[p].mass;
     failures += mpm_initialise(mpm, own, n) != BASE_OK;
-    for (int s = 0; s < 20; s++) failures += mpm_step(mpm, own, n, 5e-4) != BASE_OK;
+    for (int s = 0; s < STEPS; s++) failures += mpm_step(mpm, own, n, 5e-4) != BASE_OK;
 #pragma omp barrier
     memcpy(joined + (rank ? share[0] : 0), own, (size_t)n * sizeof *own);
     free(own), free(content);

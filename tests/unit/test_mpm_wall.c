@@ -45,7 +45,8 @@ static void apply_gravity(Block *block, double gravity) {
   for (int p = 0; p < block->count; p++) block->points[p].force[1] = -gravity * block->points[p].mass;
 }
 
-/* Lets the block come to rest on the floor, then gives it a speed of 1 m/s; returns the mean deceleration over `time`. */
+/* Lets the block come to rest on the floor, then gives it a speed of 1 m/s; returns the mean deceleration over `time`.
+ */
 static double slide(MpmTransfer transfer, MpmWallContact contact, double friction, double time, double *heat_error) {
   const double low[3] = {0.02, 0.0, 0.0}, gravity = 10.0;
   Block block;
@@ -81,7 +82,8 @@ static void a_sliding_block_decelerates_by_mu_g(void **state) {
   for (int t = 0; t < 3; t++) {
     double heat_error;
     const double deceleration = slide(transfers[t], MPM_WALL_FRICTION, 0.3, 0.2, &heat_error);
-    printf("sliding block, transfer %d: deceleration %.4f of mu g = 3, friction work off by %.2e\n", t, deceleration, heat_error);
+    printf("sliding block, transfer %d: deceleration %.4f of mu g = 3, friction work off by %.2e\n", t, deceleration,
+           heat_error);
     AT_MOST(fabs(deceleration / 3.0 - 1.0), 0.01);
     /* The block also rocks and shears: a few per cent of its loss is elastic, not heat. */
     AT_MOST(heat_error, 0.05);
@@ -142,11 +144,13 @@ static void a_moving_wall_takes_the_body_along(void **state) {
     OK(mpm_step(block.mpm, block.points, block.count, block.dt));
     walls[1].point[1] += block.dt * walls[1].velocity[1];
   }
-  /* Lateral strain is free: sigma_yy = E / (1 - nu^2) ln(1 + dv t / H). The damping force 100 1/s x 0.01 m/s x m is 1e-3 of it. */
+  /* Lateral strain is free: sigma_yy = E / (1 - nu^2) ln(1 + dv t / H). The damping force 100 1/s x 0.01 m/s x m is
+   * 1e-3 of it. */
   const double strain = log(1.0 - 0.001 * steps * block.dt / 0.2), exact = 1e6 / (1.0 - 0.04) * strain;
   const double force = -0.4 * exact;
   printf("plate: force %.1f above, %.1f below, exact %.1f\n", -walls[1].reaction[1], walls[0].reaction[1], force);
-  AT_MOST(fabs(walls[0].reaction[1] / force - 1.0), 0.05); /* nodal walls: the plate acts on the node row above it until it passes it */
+  AT_MOST(fabs(walls[0].reaction[1] / force - 1.0),
+          0.05); /* nodal walls: the plate acts on the node row above it until it passes it */
   AT_MOST(fabs(-walls[1].reaction[1] / force - 1.0), 0.05);
   free_block(&block);
 
@@ -229,13 +233,15 @@ static void a_range_limits_a_wall(void **state) {
   free_block(&block);
 }
 
-/* Pressure on all four sides: rigid balance to round-off, then sigma = -p inside. Lateral bins: each side gets its own length. */
+/* Pressure on all four sides: rigid balance to round-off, then sigma = -p inside. Lateral bins: each side gets its own
+ * length. */
 static void tractions_load_the_outermost_layer(void **state) {
   (void)state;
   const double low[3] = {0.013, 0.027, 0.0}, pressure = 1e4;
   Block block;
   make_block(&block, MPM_TRANSFER_FLIP, 1e6, 100.0, low);
-  MpmTraction sides[4] = {{0, 1, {-pressure, 0, 0}}, {0, -1, {pressure, 0, 0}}, {1, 1, {0, -pressure, 0}}, {1, -1, {0, pressure, 0}}};
+  MpmTraction sides[4] = {
+      {0, 1, {-pressure, 0, 0}}, {0, -1, {pressure, 0, 0}}, {1, 1, {0, -pressure, 0}}, {1, -1, {0, pressure, 0}}};
   /* One side alone, one step: momentum = p x height x dt. */
   OK(mpm_set_tractions(block.mpm, sides, 1));
   OK(mpm_step(block.mpm, block.points, block.count, block.dt));
@@ -249,10 +255,12 @@ static void tractions_load_the_outermost_layer(void **state) {
   for (int p = 0; p < block.count; p++)
     for (int i = 0; i < 2; i++) mean[i] += block.points[p].stress[i] / block.count;
   printf("traction of -10000 on all sides: mean stress %.1f %.1f\n", mean[0], mean[1]);
-  /* Exactly: sum V sigma = sum x f. The load acts on the centres of the outermost points, 7/8 of the width and 3/4 of the height apart. */
+  /* Exactly: sum V sigma = sum x f. The load acts on the centres of the outermost points, 7/8 of the width and 3/4 of
+   * the height apart. */
   AT_MOST(fabs(mean[0] / (-pressure * 7 / 8) - 1.0), 1e-3);
   AT_MOST(fabs(mean[1] / (-pressure * 3 / 4) - 1.0), 1e-3);
-  /* Opposite layers differ a little in deformation: the resultant (damping 100 1/s times momentum) stays below 1 % of the side's load. */
+  /* Opposite layers differ a little in deformation: the resultant (damping 100 1/s times momentum) stays below 1 % of
+   * the side's load. */
   for (int i = 0; i < 2; i++) AT_MOST(100.0 * block.mass * fabs(mean_velocity(&block, i)), 0.01 * pressure * 0.2);
   free_block(&block);
 }
