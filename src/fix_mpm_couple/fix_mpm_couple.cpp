@@ -107,7 +107,7 @@ void FixMPMCouple::check_keywords(const KeywordParser &parser) {
   if (!scene_.mechanical && !scene_.thermal)
     parser.fail("keyword 'mechanics': 'no' without 'thermal yes' leaves nothing to do");
   if (given_density_ > 0.0 && rve_id_.empty())
-    parser.fail("keyword 'density/bulk' needs 'material rve'; with 'material elastic' use: set group GROUP density RHO");
+    parser.fail("keyword 'density/bulk' needs 'material rve'; with 'material elastic': set group GROUP density RHO");
   if (!parser.given("threads")) {
     const int share = rank_threads(world), wanted = omp_get_max_threads();
     scene_.threads = share < wanted ? share : wanted;

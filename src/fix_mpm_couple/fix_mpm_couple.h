@@ -35,8 +35,8 @@ namespace LAMMPS_NS {
  *
  * Size: `point/size`, else the spacing of the current lattice (sq, sc); in 2D the third edge is a metre of depth, so
  * that masses, forces and energies are per metre. Mass: volume times bulk density, which is that of the packings
- * (material rve; `density/bulk` replaces it, to scale inertia) or the particles' own `density` (material elastic). The particle's rmass becomes the point's mass,
- * its radius half the smallest edge.
+ * (material rve; `density/bulk` replaces it, to scale inertia) or the particles' own `density` (material elastic). The
+ * particle's rmass becomes the point's mass, its radius half the smallest edge.
  *
  * Points have numbers (f[30] of a particle): they count by position, z first, then y, then x, the same on any number of
  * ranks, whereas ids from create_atoms depend on it; on one rank both agree. Messages about points and fix mpm/vtk use
@@ -188,6 +188,7 @@ class FixMPMCouple : public Fix {
   bigint count_points(bool inside_only) const;
   bool is_outside(const double position[3]) const;
 
+  void sum_points(struct DoubleSum sum[TOTALS]) const;
   void update_totals();
   void start_progress();
   void progress();

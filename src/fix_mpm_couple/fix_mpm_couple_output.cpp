@@ -9,6 +9,7 @@
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
+#include "double_sum.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
 #include "rank_error.h"
@@ -16,29 +17,40 @@
 
 using namespace LAMMPS_NS;
 
+/* This rank's part of the sums over points. */
+void FixMPMCouple::sum_points(DoubleSum sum[TOTALS]) const {
+  for (size_t n = 0; n < points_.size(); n++) {
+    const MpmPoint &point = points_[n];
+    const int i = particle_[n];
+    MpmTotals one;
+    mpm_totals(&point, 1, &one);
+    sum[TOTAL_MASS].add(one.mass);
+    for (int k = 0; k < 3; k++) sum[TOTAL_MOMENTUM + k].add(one.momentum[k]);
+    sum[TOTAL_KINETIC].add(one.kinetic_energy);
+    sum[TOTAL_THERMAL].add(one.thermal_energy);
+    sum[TOTAL_POINTS].add(1.0);
+    double position[3];
+    domain->unmap(atom->x[i], atom->image[i], position);
+    for (int k = 0; k < 3; k++) sum[TOTAL_POTENTIAL].add(-point.force[k] * position[k]);
+    const double volume = point.volume0 * tensor_determinant(point.deformation_gradient);
+    sum[TOTAL_STORED].add(volume * point.scalars[MPM_LAW_ENERGY_DENSITY]);
+    sum[TOTAL_EXTERNAL_WORK].add(state_[i][STATE_EXTERNAL_WORK]);
+  }
+}
+
 /* Collective, as thermo output is. */
 void FixMPMCouple::update_totals() {
   if (totals_step_ == update->ntimestep) return;
   gather();
-  MpmTotals sums;
-  mpm_totals(points_.data(), (int)points_.size(), &sums);
-  double mine[TOTALS] = {};
-  mine[TOTAL_MASS] = sums.mass;
-  for (int k = 0; k < 3; k++) mine[TOTAL_MOMENTUM + k] = sums.momentum[k];
-  mine[TOTAL_KINETIC] = sums.kinetic_energy;
-  mine[TOTAL_THERMAL] = sums.thermal_energy;
-  mine[TOTAL_POINTS] = (double)points_.size();
-  for (size_t n = 0; n < points_.size(); n++) {
-    const MpmPoint &point = points_[n];
-    const int i = particle_[n];
-    double position[3];
-    domain->unmap(atom->x[i], atom->image[i], position);
-    for (int k = 0; k < 3; k++) mine[TOTAL_POTENTIAL] -= point.force[k] * position[k];
-    mine[TOTAL_STORED] +=
-        point.volume0 * tensor_determinant(point.deformation_gradient) * point.scalars[MPM_LAW_ENERGY_DENSITY];
-    mine[TOTAL_EXTERNAL_WORK] += state_[i][STATE_EXTERNAL_WORK];
+  DoubleSum mine[TOTALS];
+  sum_points(mine);
+  std::vector<DoubleSum> parts((size_t)TOTALS * comm->nprocs);
+  MPI_Allgather(mine, 2 * TOTALS, MPI_DOUBLE, parts.data(), 2 * TOTALS, MPI_DOUBLE, world);
+  for (int k = 0; k < TOTALS; k++) {
+    DoubleSum sum;
+    for (int rank = 0; rank < comm->nprocs; rank++) sum.add(parts[(size_t)rank * TOTALS + k]);
+    totals_[k] = sum.value();
   }
-  MPI_Allreduce(mine, totals_, TOTALS, MPI_DOUBLE, MPI_SUM, world);
   if (rve_ && rve_->law()) {
     RveLawTotals law;
     fix_check(lmp, this, rve_law_totals(rve_->law(), &law));
