@@ -27,13 +27,13 @@ extern const RveKernels rve_kernels_avx2, rve_kernels_avx512;
 /* The device. Arenas live there; all functions work on a whole batch. */
 typedef struct RveDevice RveDevice;
 typedef struct RveDeviceJob {
-  int rve;             /* which RVE */
-  int refresh;         /* 1: only forces of the present state; works done stay as they are */
-  int pairs;           /* candidate pairs to have room for */
-  int outcome;         /* out: RveOutcome */
+  int rve;     /* which RVE */
+  int refresh; /* 1: only forces of the present state; works done stay as they are */
+  int pairs;   /* candidate pairs to have room for */
+  int outcome; /* out: RveOutcome */
   RveCall call;
   double work_before, duration;
-  RveAnswer answer;    /* in: the last one; out */
+  RveAnswer answer; /* in: the last one; out */
 } RveDeviceJob;
 
 /* 1 if CUDA was built in and a device answers. */
@@ -50,13 +50,14 @@ BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob 
 typedef struct RveRecord {
   RveCounts counts;
   RveArrays arrays;
-  void *arena;   /* on the host; with a device: a copy that may be old */
+  void *arena; /* on the host; with a device: a copy that may be old */
   size_t bytes;
   RveAnswer last;
 } RveRecord;
 
 /* rve_state.c, rve_restart.c, rve_view.c */
-BaseStatus rve_record_from_packing(const RveKernels *kernels, const RveScene *scene, const RvePacking *packing, RveRecord *record);
+BaseStatus rve_record_from_packing(const RveKernels *kernels, const RveScene *scene, const RvePacking *packing,
+                                   RveRecord *record);
 void rve_record_destroy(RveRecord *record);
 BaseStatus rve_record_alloc(const RveCounts *counts, RveRecord *record);
 /* A larger arena with the same contents; at least the head's need_* rows. */
@@ -64,8 +65,8 @@ BaseStatus rve_record_grow(RveRecord *record);
 size_t rve_record_state_bytes(const RveRecord *record);
 BaseStatus rve_record_pack(const RveRecord *record, uint64_t scene_hash, void *bytes, size_t *written);
 /* *record is replaced on success only. *canonical = 1: another lane width, forces and list must be made anew. */
-BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, const void *bytes, size_t size, RveRecord *record,
-                             int *canonical);
+BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, const void *bytes, size_t size,
+                             RveRecord *record, int *canonical);
 BaseStatus rve_record_view(const RveRecord *record, RveView *view);
 BaseStatus rve_record_packing(const RveRecord *record, RvePacking *packing);
 void rve_record_install_bonds(RveRecord *record);
@@ -76,7 +77,8 @@ BaseStatus rve_record_conduct(const RveRecord *record, const RveScene *scene, do
 uint64_t rve_scene_hash(const RveScene *scene); /* of what a stored state depends on */
 
 /* rve_scene.c: what one call asks for. BASE_ERROR_ARGUMENT if it would take absurdly many steps. */
-BaseStatus rve_call_make(const RveScene *scene, const RveHead *head, const RveInput *input, double duration, RveCall *call);
+BaseStatus rve_call_make(const RveScene *scene, const RveHead *head, const RveInput *input, double duration,
+                         RveCall *call);
 RveFeatures rve_scene_features(const RveScene *scene);
 
 #ifdef __cplusplus

@@ -3,7 +3,8 @@
  *
  *   gcc -std=c17 -O3 -fno-math-errno -fno-trapping-math -ffp-contract=fast -DRVE_ISA=plain  -c rve_backend_cpu.c
  *   gcc ... -mavx2 -mfma                                                   -DRVE_ISA=avx2   -c rve_backend_cpu.c
- *   gcc ... -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512 -DRVE_ISA=avx512 -c rve_backend_cpu.c
+ *   gcc ... -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512 -DRVE_ISA=avx512 -c
+ * rve_backend_cpu.c
  *
  * Contraction of a * b + c is wanted here: all lanes run the same vector code, so it cannot make lanes differ. */
 #define RVE_NUMBER_plain 1
@@ -34,7 +35,7 @@ static const RveTeam alone = {0, 1, 1, 0};
 
 /* Stamps out one variant: the features are constants in it. */
 #define VARIANT(name, dimension, tangential, viscous, bonds)                                                           \
-  static int run_##name(const RveCall *call, void *arena, const RveCounts *n, RveScratch *s) {                        \
+  static int run_##name(const RveCall *call, void *arena, const RveCounts *n, RveScratch *s) {                         \
     const RveFeatures ft = {dimension, tangential, viscous, bonds};                                                    \
     RveArrays a;                                                                                                       \
     rve_layout(n, arena, &a);                                                                                          \

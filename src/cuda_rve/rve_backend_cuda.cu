@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The RVE kernels on a CUDA device: one thread block per RVE, its arena in shared memory for all steps of a call if it fits, else in
- * global memory. The same source as on the CPU (rve_step.h, rve_measure.h), a pack of 32 grains per warp. */
+/* The RVE kernels on a CUDA device: one thread block per RVE, its arena in shared memory for all steps of a call if it
+ * fits, else in global memory. The same source as on the CPU (rve_step.h, rve_measure.h), a pack of 32 grains per warp.
+ */
 #include <cuda_runtime.h>
 #include <stdlib.h>
 
@@ -26,16 +27,16 @@ typedef struct DeviceJob {
 } DeviceJob;
 
 struct RveDevice {
-  int count;           /* RVEs known */
-  DeviceArena *arena;  /* host array */
+  int count;          /* RVEs known */
+  DeviceArena *arena; /* host array */
   DeviceJob *host, *device;
-  int jobs;            /* room in both */
+  int jobs; /* room in both */
   char *scratch;
   size_t scratch_bytes;
-  int shared_limit;    /* bytes of shared memory that a block may ask for */
+  int shared_limit; /* bytes of shared memory that a block may ask for */
 };
 
-/* ------------------------------------------------------------------------------------------------------------- kernels */
+/* -------------------------------------------------------------------------------------------------------- kernels */
 
 static __device__ void copy_words(void *to, const void *from, size_t bytes) {
   int4 *target = (int4 *)to;
@@ -90,7 +91,7 @@ static int variant_of(RveFeatures ft) {
   return 4 * (ft.dimension - 2) + (ft.bonds ? 3 : ft.viscous ? 2 : ft.tangential ? 1 : 0);
 }
 
-/* ---------------------------------------------------------------------------------------------------------------- host */
+/* ----------------------------------------------------------------------------------------------------------- host */
 
 static BaseStatus checked(cudaError_t error, const char *doing) {
   if (error == cudaSuccess) return BASE_OK;
@@ -126,8 +127,9 @@ BaseStatus rve_device_create(const RveKernels **layout, RveDevice **result) {
     status = checked(cudaFuncGetAttributes(&attributes, (const void *)kernels[k]), "loading a kernel");
     const int room = device->shared_limit - (int)attributes.sharedSizeBytes;
     if (status == BASE_OK)
-      status = checked(cudaFuncSetAttribute((const void *)kernels[k], cudaFuncAttributeMaxDynamicSharedMemorySize, room),
-                       "reserving shared memory");
+      status =
+          checked(cudaFuncSetAttribute((const void *)kernels[k], cudaFuncAttributeMaxDynamicSharedMemorySize, room),
+                  "reserving shared memory");
   }
   device->shared_limit -= 4096; /* what the kernels declare themselves */
   if (status != BASE_OK) base_free(device);

@@ -26,7 +26,7 @@ struct RveBatch {
   char name[16];
 };
 
-/* ----------------------------------------------------------------------------------------------------- which kernels */
+/* -------------------------------------------------------------------------------------------------- which kernels */
 
 static const RveKernels *choose_kernels(void) {
   const RveKernels *best = &rve_kernels_plain;
@@ -43,7 +43,7 @@ static const RveKernels *choose_kernels(void) {
   return best;
 }
 
-/* ---------------------------------------------------------------------------------------------------------- one record */
+/* ----------------------------------------------------------------------------------------------------- one record */
 
 static BaseStatus reserve(Workspace *workspace, const RveCounts *counts, int pairs, RveScratch *scratch) {
   const size_t bytes = rve_scratch_layout(counts, pairs, NULL, scratch);
@@ -73,10 +73,12 @@ static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const Rve
   }
 }
 
-static void measure_record(const RveBatch *batch, RveRecord *record, const RveCall *call, double work_before, double duration) {
+static void measure_record(const RveBatch *batch, RveRecord *record, const RveCall *call, double work_before,
+                           double duration) {
   RveHead *head = rve_head(record->arena);
   if (!head->failed)
-    batch->kernels->measure(batch->features, call, record->arena, &record->counts, work_before, duration, &record->last);
+    batch->kernels->measure(batch->features, call, record->arena, &record->counts, work_before, duration,
+                            &record->last);
   if (head->failed) record->last.status = BASE_ERROR_UNSTABLE;
 }
 
@@ -109,23 +111,25 @@ static BaseStatus step_record(const RveBatch *batch, RveRecord *record, const Rv
   return BASE_OK;
 }
 
-/* ------------------------------------------------------------------------------------------------------------ creation */
+/* ------------------------------------------------------------------------------------------------------- creation */
 
 static BaseStatus check_arguments(const RveScene *scene, const RvePacking *packings, int packing_count,
                                   const int *packing_of_rve, int count) {
   TRY(rve_scene_check(scene));
   if (count < 1) return base_error(BASE_ERROR_ARGUMENT, "a batch of %d RVEs (allowed: at least 1)", count);
-  if (packing_count < 1) return base_error(BASE_ERROR_ARGUMENT, "a batch from %d packings (allowed: at least 1)", packing_count);
+  if (packing_count < 1)
+    return base_error(BASE_ERROR_ARGUMENT, "a batch from %d packings (allowed: at least 1)", packing_count);
   for (int k = 0; k < packing_count; k++) {
     BaseStatus status = rve_packing_check(&packings[k]);
     if (status != BASE_OK) return base_error_context(status, "packing %d: ", k);
     if (packings[k].dimension != scene->dimension)
-      return base_error(BASE_ERROR_ARGUMENT, "packing %d: dimension = %d (allowed: the scene's, %d)", k, packings[k].dimension,
-                        scene->dimension);
+      return base_error(BASE_ERROR_ARGUMENT, "packing %d: dimension = %d (allowed: the scene's, %d)", k,
+                        packings[k].dimension, scene->dimension);
   }
   for (int k = 0; packing_of_rve && k < count; k++)
     if (packing_of_rve[k] < 0 || packing_of_rve[k] >= packing_count)
-      return base_error(BASE_ERROR_ARGUMENT, "RVE %d has packing %d (allowed: 0 to %d)", k, packing_of_rve[k], packing_count - 1);
+      return base_error(BASE_ERROR_ARGUMENT, "RVE %d has packing %d (allowed: 0 to %d)", k, packing_of_rve[k],
+                        packing_count - 1);
   return BASE_OK;
 }
 
@@ -175,17 +179,19 @@ static BaseStatus refresh(RveBatch *batch, int n, const int *index) {
   }
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
   for (int k = 0; k < n; k++) {
-    BaseStatus status = refresh_record(batch, &batch->record[index ? index[k] : k], &batch->workspace[omp_get_thread_num()]);
+    BaseStatus status =
+        refresh_record(batch, &batch->record[index ? index[k] : k], &batch->workspace[omp_get_thread_num()]);
     if (status != BASE_OK) {
 #pragma omp critical(rve_refresh)
       first = status;
     }
   }
-  return first == BASE_ERROR_MEMORY ? base_error(first, "not enough memory for the neighbour lists of %d RVEs", n) : first;
+  return first == BASE_ERROR_MEMORY ? base_error(first, "not enough memory for the neighbour lists of %d RVEs", n)
+                                    : first;
 }
 
-BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, int packing_count, const int *packing_of_rve,
-                            int count, RveBackend backend, RveBatch **result) {
+BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, int packing_count,
+                            const int *packing_of_rve, int count, RveBackend backend, RveBatch **result) {
   RveBatch *batch = NULL;
   RveRecord *model = NULL;
   BaseStatus status;
@@ -240,7 +246,7 @@ int rve_batch_count(const RveBatch *batch) { return batch->count; }
 const char *rve_batch_backend_name(const RveBatch *batch) { return batch->name; }
 const RveScene *rve_batch_scene(const RveBatch *batch) { return &batch->scene; }
 
-/* ------------------------------------------------------------------------------------------------------------ stepping */
+/* ------------------------------------------------------------------------------------------------------- stepping */
 
 static BaseStatus check_index(const RveBatch *batch, int n, const int *index) {
   if (n < 0 || (!index && n > batch->count) || (index && n > batch->count))
@@ -257,7 +263,8 @@ static BaseStatus check_input(const RveBatch *batch, int n, const RveInput *inpu
   for (int k = 0; k < n; k++) {
     double sum = batch->scene.thermal ? input[k].temperature : 0.0;
     for (int m = 0; m < 9; m++) sum += input[k].velocity_gradient[m];
-    if (!isfinite(sum)) return base_error(BASE_ERROR_ARGUMENT, "input %d: velocity gradient or temperature is not finite", k);
+    if (!isfinite(sum))
+      return base_error(BASE_ERROR_ARGUMENT, "input %d: velocity gradient or temperature is not finite", k);
   }
   return BASE_OK;
 }
@@ -332,24 +339,25 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
     if (answer[k].status != BASE_OK) unstable = index ? index[k] : k;
   }
   if (unstable >= 0)
-    return base_error(BASE_ERROR_UNSTABLE, "RVE %d is unstable: a grain ran away, a value is not finite, or the cell is too narrow",
+    return base_error(BASE_ERROR_UNSTABLE,
+                      "RVE %d is unstable: a grain ran away, a value is not finite, or the cell is too narrow",
                       unstable);
   return BASE_OK;
 }
 
-/* ------------------------------------------------------------------------------------------------------------- changes */
+/* -------------------------------------------------------------------------------------------------------- changes */
 
 BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
   const RveScene *old = &batch->scene;
   TRY(rve_scene_check(scene));
   if (rve_scene_hash(scene) != rve_scene_hash(old))
-    return base_error(BASE_ERROR_ARGUMENT, "dimension, grain, thickness, density, thermal, bonds and whether tangential_stiffness "
-                                           "is 0 cannot change after creation");
-  const int stiffer = scene->normal_stiffness != old->normal_stiffness ||
-                      scene->tangential_stiffness != old->tangential_stiffness ||
-                      scene->normal_viscosity != old->normal_viscosity || scene->rotation != old->rotation ||
-                      scene->tangential_viscosity != old->tangential_viscosity ||
-                      scene->critical_damping != old->critical_damping;
+    return base_error(BASE_ERROR_ARGUMENT,
+                      "dimension, grain, thickness, density, thermal, bonds and whether tangential_stiffness "
+                      "is 0 cannot change after creation");
+  const int stiffer =
+      scene->normal_stiffness != old->normal_stiffness || scene->tangential_stiffness != old->tangential_stiffness ||
+      scene->normal_viscosity != old->normal_viscosity || scene->rotation != old->rotation ||
+      scene->tangential_viscosity != old->tangential_viscosity || scene->critical_damping != old->critical_damping;
   for (int k = 0; stiffer && k < batch->count; k++) {
     RvePacking packing;
     TRY(rve_batch_packing(batch, k, &packing));
@@ -388,7 +396,7 @@ BaseStatus rve_batch_rest(RveBatch *batch, int n, const int *index) {
   return refresh(batch, n, index);
 }
 
-/* -------------------------------------------------------------------------------------------------- states in and out */
+/* ---------------------------------------------------------------------------------------------- states in and out */
 
 static BaseStatus check_rve(const RveBatch *batch, int rve) {
   if (rve < 0 || rve >= batch->count)

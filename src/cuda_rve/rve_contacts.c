@@ -18,7 +18,8 @@ void rve_contacts_destroy(RveContacts *contacts) {
 static int place_of(const int32_t *place_of_id, int id) { return place_of_id ? place_of_id[id] : id; }
 
 /* first [blocks + 1]: rows of each block, as many as its busiest grain has contacts. degree [N]: working memory. */
-static void deal(const RveContacts *contacts, const int32_t *place_of_id, const RveCounts *n, int32_t *degree, int32_t *first) {
+static void deal(const RveContacts *contacts, const int32_t *place_of_id, const RveCounts *n, int32_t *degree,
+                 int32_t *first) {
   memset(degree, 0, (size_t)n->blocks * (size_t)n->lanes * sizeof *degree);
   memset(first, 0, ((size_t)n->blocks + 1) * sizeof *first);
   for (int c = 0; c < contacts->count; c++) {

@@ -27,8 +27,8 @@ BaseStatus rve_contacts_place(const RveContacts *contacts, const int32_t *place_
 /* Walks over occupied slots: for (rve_slot_start(r, &s); rve_slot_next(&s);). */
 typedef struct RveSlot {
   const RveRecord *record;
-  int block, slot;     /* present place */
-  int i, j;            /* places of the grains */
+  int block, slot; /* present place */
+  int i, j;        /* places of the grains */
   int image[3];
   uint16_t *image_word;
   double branch[3], length, overlap; /* m */

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* One DEM step of one RVE: move pass (sum of reactions, kick, drift) - cell - contact pass. Written once for all backends and both
- * dimensions; see rve_team.h for the lanes.
+/* One DEM step of one RVE: move pass (sum of reactions, kick, drift) - cell - contact pass. Written once for all
+ * backends and both dimensions; see rve_team.h for the lanes.
  *
- * Leapfrog. v lives half a step behind s: v += dt (f/m - L v), s += H^-1 v dt, H <- exp(L dt) H, then contacts at the new
- * places. v is the fluctuation about the affine flow, hence the term L v. Spins are relative to the flow's vorticity W, so that
- * the velocity of a contact contains D = sym L only, and a rigid rotation strains nothing. */
+ * Leapfrog. v lives half a step behind s: v += dt (f/m - L v), s += H^-1 v dt, H <- exp(L dt) H, then contacts at the
+ * new places. v is the fluctuation about the affine flow, hence the term L v. Spins are relative to the flow's
+ * vorticity W, so that the velocity of a contact contains D = sym L only, and a rigid rotation strains nothing. */
 #ifndef DEMPM_RVE_KERNEL_H
 #define DEMPM_RVE_KERNEL_H
 
@@ -84,7 +84,7 @@ RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a
   }
 }
 
-/* ------------------------------------------------------------------------------------------------------ contact pass */
+/* --------------------------------------------------------------------------------------------------- contact pass */
 
 typedef struct RveContactPass {
   rve_real h[9];    /* H times RVE_UNIT */
@@ -103,8 +103,7 @@ RVE_FN double rve_bond_force_factor(const RveCall *call, double temperature) {
   /* TM-DEMPM eq. 40, corrected for reference temperatures other than 0. */
   double left = 1.0;
   const double melting = call->bond_melting_temperature;
-  if (call->thermal && melting < 1e300)
-    left = (melting - temperature) / (melting - call->reference_temperature);
+  if (call->thermal && melting < 1e300) left = (melting - temperature) / (melting - call->reference_temperature);
   left = left < 0.0 ? 0.0 : left > 1.0 ? 1.0 : left;
   return call->bond_strength * left * call->normal_stiffness;
 }
@@ -157,10 +156,12 @@ RVE_FN rve_real rve_cap(RveFeatures ft, const RveContactPass *c, rve_real fn) {
   return c->mu * (ft.viscous || ft.bonds ? rve_abs(fn) : fn);
 }
 
-/* Tangential part: history, Coulomb's cap (or the bond), dashpot. stick: lanes that an intact bond exempts from the cap. Follows
- * LIGGGHTS' `tangential history`: the dashpot acts on contacts that do not slide and is outside the cap. */
-RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, rve_mask touch, rve_mask bonded, rve_real trial, rve_real vt,
-                              rve_real fn, rve_real gt, rve_real *spring, rve_real *total, rve_real *slip, rve_real *loss) {
+/* Tangential part: history, Coulomb's cap (or the bond), dashpot. stick: lanes that an intact bond exempts from the
+ * cap. Follows LIGGGHTS' `tangential history`: the dashpot acts on contacts that do not slide and is outside the cap.
+ */
+RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, rve_mask touch, rve_mask bonded, rve_real trial,
+                              rve_real vt, rve_real fn, rve_real gt, rve_real *spring, rve_real *total, rve_real *slip,
+                              rve_real *loss) {
   const rve_real zero = rve_set(0.0), cap = rve_cap(ft, c, fn);
   rve_real f = rve_min(rve_max(trial, zero - cap), cap);
   if (ft.bonds) f = rve_select(bonded, trial, f);
@@ -175,9 +176,9 @@ RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, rve_mask 
   }
 }
 
-RVE_FN void rve_tangential_3d(RveFeatures ft, const RveContactPass *c, rve_mask touch, rve_mask bonded, const rve_real trial[3],
-                              rve_real size2, const rve_real vt[3], rve_real fn, rve_real gt, rve_real spring[3],
-                              rve_real total[3], rve_real *slip, rve_real *loss) {
+RVE_FN void rve_tangential_3d(RveFeatures ft, const RveContactPass *c, rve_mask touch, rve_mask bonded,
+                              const rve_real trial[3], rve_real size2, const rve_real vt[3], rve_real fn, rve_real gt,
+                              rve_real spring[3], rve_real total[3], rve_real *slip, rve_real *loss) {
   const rve_real one = rve_set(1.0), cap = rve_cap(ft, c, fn);
   rve_real factor = rve_min(one, cap * rve_inverse_sqrt(size2 + rve_set(1e-300)));
   if (ft.bonds) factor = rve_select(bonded, one, factor);
@@ -194,11 +195,52 @@ RVE_FN void rve_tangential_3d(RveFeatures ft, const RveContactPass *c, rve_mask 
   }
 }
 
-/* Lanes whose intact bond breaks now: tension above F_nb, or tangential force above mu_b F_nb (eq. 38-39, tension positive). */
-RVE_FN rve_mask rve_breaking(const RveContactPass *c, rve_mask bonded, rve_real overlap, rve_real radii, rve_real trial2) {
+/* Lanes whose intact bond breaks now: tension above F_nb, or tangential force above mu_b F_nb (eq. 38-39, tension
+ * positive). */
+RVE_FN rve_mask rve_breaking(const RveContactPass *c, rve_mask bonded, rve_real overlap, rve_real radii,
+                             rve_real trial2) {
   const rve_real strength = c->bond * rve_set(0.5) * radii, shear = c->bond_ratio * strength;
   const rve_mask pulled = rve_less(strength, rve_set(0.0) - c->kn * overlap);
   return rve_and(bonded, rve_or(pulled, rve_less(shear * shear, trial2)));
+}
+
+/* Tangential force if nothing slid: history turned with the flow, plus the step's relative motion, in the tangent
+ * plane. In: u, relative velocity of the centres; out: u, of the surfaces and tangential (2D: u[0]; 3D: only if a
+ * dashpot asks). Returns |trial|^2. */
+RVE_FN rve_real rve_trial(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveBody *own,
+                          const RveBody *other, int lane0, rve_real lever, rve_real other_lever, const rve_real n[3],
+                          rve_real u[3], rve_real trial[3]) {
+  rve_real w[3], old[3];
+  for (int k = 0; k < rve_spins(ft); k++) {
+    w[k] = lever * own->w[k] + other_lever * other->w[k];
+    old[k] = rve_load(a->shear[k], lane0);
+  }
+  if (ft.dimension == 2) {
+    u[0] = n[0] * u[1] - n[1] * u[0] - w[0];
+    trial[0] = old[0] + c->kt_dt * u[0];
+    return trial[0] * trial[0];
+  }
+  for (int k = 0; k < 3; k++) {
+    trial[k] = old[k];
+    if (c->turning) trial[k] = c->turn[3 * k] * old[0] + c->turn[3 * k + 1] * old[1] + c->turn[3 * k + 2] * old[2];
+  }
+  const rve_real cross[3] = {w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2], w[0] * n[1] - w[1] * n[0]};
+  for (int k = 0; k < 3; k++) u[k] = u[k] - cross[k], trial[k] = trial[k] + c->kt_dt * u[k];
+  const rve_real along = rve_dot(3, trial, n);
+  for (int k = 0; k < 3; k++) trial[k] = trial[k] - along * n[k];
+  if (ft.viscous) {
+    const rve_real normal = rve_dot(3, u, n);
+    for (int k = 0; k < 3; k++) u[k] = u[k] - normal * n[k];
+  }
+  return rve_dot(3, trial, trial);
+}
+
+/* Bonds of one row: which lanes are still bonded. Broken ones are forgotten at once. */
+RVE_FN rve_mask rve_test_bonds(const RveContactPass *c, const RveArrays *a, int lane0, rve_int image, rve_mask bonded,
+                               rve_real overlap, rve_real radii, rve_real trial2) {
+  const rve_mask broken = rve_breaking(c, bonded, overlap, radii, trial2);
+  if (rve_any(broken)) rve_store_short(a->image, lane0, rve_int_clear(broken, image, rve_set_int(RVE_IMAGE_BOND)));
+  return rve_and_not(bonded, broken);
 }
 
 /* One row of slots: forces, history, work. */
@@ -232,34 +274,10 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
   rve_real total[3];
   if (ft.tangential) {
     const rve_real lever = own->r - half * overlap, other_lever = other.r - half * overlap;
-    rve_real trial[3], trial2, spring[3];
-    if (dim == 2) {
-      const rve_real vt = n[0] * u[1] - n[1] * u[0] - (lever * own->w[0] + other_lever * other.w[0]);
-      trial[0] = rve_load(a->shear[0], lane0) + c->kt_dt * vt;
-      trial2 = trial[0] * trial[0];
-      u[0] = vt;
-    } else {
-      rve_real w[3], old[3];
-      for (int k = 0; k < 3; k++) w[k] = lever * own->w[k] + other_lever * other.w[k], old[k] = rve_load(a->shear[k], lane0);
-      if (c->turning)
-        for (int k = 0; k < 3; k++)
-          trial[k] = c->turn[3 * k] * old[0] + c->turn[3 * k + 1] * old[1] + c->turn[3 * k + 2] * old[2];
-      else
-        for (int k = 0; k < 3; k++) trial[k] = old[k];
-      const rve_real cross[3] = {w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2], w[0] * n[1] - w[1] * n[0]};
-      for (int k = 0; k < 3; k++) u[k] = u[k] - cross[k], trial[k] = trial[k] + c->kt_dt * u[k];
-      const rve_real along = rve_dot(3, trial, n);
-      for (int k = 0; k < 3; k++) trial[k] = trial[k] - along * n[k];
-      trial2 = rve_dot(3, trial, trial);
-      if (ft.viscous) {
-        const rve_real normal = rve_dot(3, u, n);
-        for (int k = 0; k < 3; k++) u[k] = u[k] - normal * n[k];
-      }
-    }
+    rve_real trial[3], spring[3];
+    const rve_real trial2 = rve_trial(ft, c, a, own, &other, lane0, lever, other_lever, n, u, trial);
     if (ft.bonds) {
-      const rve_mask broken = rve_breaking(c, bonded, overlap, radii, trial2);
-      if (rve_any(broken)) rve_store_short(a->image, lane0, rve_int_clear(broken, image, rve_set_int(RVE_IMAGE_BOND)));
-      bonded = rve_and_not(bonded, broken);
+      bonded = rve_test_bonds(c, a, lane0, image, bonded, overlap, radii, trial2);
       touch = rve_or(touch, bonded);
     }
     if (dim == 2) {
@@ -274,9 +292,7 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
     }
     for (int k = 0; k < rve_spins(ft); k++) rve_store(a->shear[k], lane0, spring[k]);
   } else if (ft.bonds) {
-    const rve_mask broken = rve_breaking(c, bonded, overlap, radii, zero);
-    if (rve_any(broken)) rve_store_short(a->image, lane0, rve_int_clear(broken, image, rve_set_int(RVE_IMAGE_BOND)));
-    touch = rve_or(touch, rve_and_not(bonded, broken));
+    touch = rve_or(touch, rve_test_bonds(c, a, lane0, image, bonded, overlap, radii, zero));
   }
   fn = rve_keep(touch, fn);
   for (int k = 0; k < dim; k++) p.force[k] = zero - fn * n[k];
@@ -300,7 +316,8 @@ RVE_FN void rve_write_reaction(RveFeatures ft, const RveCounts *n, const RveArra
   } else {
     double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
     double *const g[4] = {field[4], field[5], 0, 0};
-    const RveQuad q = {{zero - p->force[0], zero - p->force[1], zero - p->force[2], ft.tangential ? p->other_torque[0] : zero}};
+    const RveQuad q = {
+        {zero - p->force[0], zero - p->force[1], zero - p->force[2], ft.tangential ? p->other_torque[0] : zero}};
     rve_scatter(a->reaction, n->reaction, f, lane0, q);
     if (ft.tangential) {
       const RveQuad t = {{p->other_torque[1], p->other_torque[2], zero, zero}};
@@ -328,7 +345,8 @@ RVE_FN void rve_sum_reactions(RveFeatures ft, const RveArrays *a, int block, rve
   }
 }
 
-/* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots. */
+/* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
+ */
 RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
                              const RveCounts *n, const RveArrays *a, rve_real *slip, rve_real *loss) {
   const RveContactPass c = rve_contact_pass_of(call, head, dt);
@@ -349,12 +367,10 @@ RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall 
   }
 }
 
-/* --------------------------------------------------------------------------------------------------------- move pass */
+/* ------------------------------------------------------------------------------------------------------ move pass */
 
 /* Cundall's damping of one component; adds the power it takes. */
-RVE_FN rve_real rve_damp(rve_real alpha, rve_real f, rve_real v) {
-  return f - rve_sign_like(alpha, f * v) * f;
-}
+RVE_FN rve_real rve_damp(rve_real alpha, rve_real f, rve_real v) { return f - rve_sign_like(alpha, f * v) * f; }
 
 /* Sums forces, kicks, drifts. fastest: largest v^2; loss: work of local damping, J. */
 RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double scale,
@@ -371,7 +387,8 @@ RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *ca
     rve_real f[3], t[3];
     RveBody b, old;
     rve_sum_reactions(ft, a, block, f, t);
-    for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0), old.v[k] = rve_load(a->velocity[k], lane0);
+    for (int k = 0; k < dim; k++)
+      f[k] = f[k] + rve_load(a->force[k], lane0), old.v[k] = rve_load(a->velocity[k], lane0);
     const rve_real per_mass = rve_load(a->inverse_mass, lane0) * dt;
     for (int k = 0; k < dim; k++) {
       const rve_real used = damped ? rve_damp(alpha, f[k], old.v[k]) : f[k];

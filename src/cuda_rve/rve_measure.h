@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* What a material point learns from its RVE, computed once per call: stress, conductivity, fabric, energies, modulus. */
+/* What a material point learns from its RVE, computed once per call: stress, conductivity, fabric, energies, modulus.
+ */
 #ifndef DEMPM_RVE_MEASURE_H
 #define DEMPM_RVE_MEASURE_H
 
@@ -106,7 +107,8 @@ RVE_FN void rve_sum_grains(RveFeatures ft, const RveArrays *a, int block, const 
   sum->of.solid = sum->of.solid + size;
 }
 
-/* Largest C_nnnn over axes, face and space diagonals, of the affine moduli C (eq. 58): (kn - kt) n n n n + kt n n terms. */
+/* Largest C_nnnn over axes, face and space diagonals, of the affine moduli C (eq. 58): (kn - kt) n n n n + kt n n
+ * terms. */
 RVE_FN double rve_largest_modulus(const RveCall *call, int dim, const double fourth[15], double volume) {
   const double factorial[5] = {1.0, 1.0, 2.0, 6.0, 24.0};
   double largest = 0.0;
@@ -136,15 +138,16 @@ RVE_FN double rve_largest_modulus(const RveCall *call, int dim, const double fou
               }
             two += pairs * fourth[at];
           }
-        const double c = (call->normal_stiffness - call->tangential_stiffness) * four + call->tangential_stiffness * two;
+        const double c =
+            (call->normal_stiffness - call->tangential_stiffness) * four + call->tangential_stiffness * two;
         largest = c / volume > largest ? c / volume : largest;
       }
   return largest;
 }
 
 RVE_FN double rve_cell_volume(const RveCall *call, const double h[9]) {
-  const double v = h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) +
-                   h[2] * (h[3] * h[7] - h[4] * h[6]);
+  const double v =
+      h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) + h[2] * (h[3] * h[7] - h[4] * h[6]);
   return fabs(v) * call->thickness;
 }
 
@@ -159,7 +162,8 @@ RVE_FN void rve_fill_answer(RveFeatures ft, const RveCall *call, const RveHead *
   }
   answer->heat = duration > 0.0 ? (head->friction_work - work_before) / (volume * duration) : 0.0;
   answer->friction_work = head->friction_work;
-  answer->solid_fraction = total->of.solid * 3.14159265358979323846 * (ft.dimension == 2 ? call->thickness : 4.0 / 3.0) / volume;
+  answer->solid_fraction =
+      total->of.solid * 3.14159265358979323846 * (ft.dimension == 2 ? call->thickness : 4.0 / 3.0) / volume;
   answer->coordination = 2.0 * contacts / n->grains;
   answer->bond_fraction = head->bonds_installed > 0 ? total->of.bonds / head->bonds_installed : 0.0;
   answer->kinetic_energy = total->of.kinetic;
@@ -174,8 +178,8 @@ RVE_FN void rve_fill_answer(RveFeatures ft, const RveCall *call, const RveHead *
 }
 
 RVE_FN int rve_answer_is_finite(const RveAnswer *x) {
-  double sum = x->heat + x->friction_work + x->kinetic_energy + x->elastic_energy + x->damping_work + x->modulus + x->volume +
-               x->unbalanced;
+  double sum = x->heat + x->friction_work + x->kinetic_energy + x->elastic_energy + x->damping_work + x->modulus +
+               x->volume + x->unbalanced;
   for (int k = 0; k < 6; k++) sum += x->stress[k] + x->conductivity[k] + x->fabric[k];
   return sum - sum == 0.0;
 }

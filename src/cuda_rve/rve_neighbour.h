@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Neighbour lists: when one is spent, and how the next is built. Every pair within reach is found through every periodic image, for any
- * cell. Run by a team's leader; rare (every few hundred to several thousand steps). */
+/* Neighbour lists: when one is spent, and how the next is built. Every pair within reach is found through every
+ * periodic image, for any cell. Run by a team's leader; rare (every few hundred to several thousand steps). */
 #ifndef DEMPM_RVE_NEIGHBOUR_H
 #define DEMPM_RVE_NEIGHBOUR_H
 
@@ -45,8 +45,9 @@ RVE_FN double rve_least_stretch(const RveHead *head) {
   return sum < 1.0 ? sqrt(1.0 - sum) : 0.0;
 }
 
-/* How far two grains may move towards each other before a pair outside the list can touch. A pair outside was farther than
- * (Ri + Rj) g0 + skin; it is now farther than stretch ((Ri + Rj) g0 + skin) - movement and touches at (Ri + Rj) g. */
+/* How far two grains may move towards each other before a pair outside the list can touch. A pair outside was farther
+ * than (Ri + Rj) g0 + skin; it is now farther than stretch ((Ri + Rj) g0 + skin) - movement and touches at (Ri + Rj) g.
+ */
 RVE_FN double rve_room(const RveHead *head) {
   const double grown = head->scale - head->stretch * head->scale_at_list;
   return head->stretch * head->skin - (grown > 0.0 ? grown : 0.0) * 2.0 * head->radius_max;
@@ -71,9 +72,10 @@ RVE_FN double rve_farthest(int dim, const RveTeam *team, const RveHead *head, co
   return sqrt(rve_team_max(team, farthest));
 }
 
-/* ------------------------------------------------------------------------------------------------------- exact changes */
+/* -------------------------------------------------------------------------------------------------- exact changes */
 
-/* Wraps positions into [-1/2, 1/2) and moves the shifts of all slots along, so that no branch changes. 0 if a shift does not fit. */
+/* Wraps positions into [-1/2, 1/2) and moves the shifts of all slots along, so that no branch changes. 0 if a shift
+ * does not fit. */
 RVE_FN int rve_wrap(const RveCounts *n, const RveArrays *a) {
   const int stride = n->row ? n->row : 1;
   int fits = 1;
@@ -114,8 +116,8 @@ RVE_FN int rve_shear_cell(int ca, int cb, int t, RveHead *head, const RveCounts 
   return fits;
 }
 
-/* Reduces a cell that large shear has skewed: no cell vector's projection on another exceeds half of that. Exact for positions, contacts
- * and histories. 0 if a shift does not fit (the cell is too narrow). */
+/* Reduces a cell that large shear has skewed: no cell vector's projection on another exceeds half of that. Exact for
+ * positions, contacts and histories. 0 if a shift does not fit (the cell is too narrow). */
 RVE_FN int rve_reduce_cell(RveHead *head, const RveCounts *n, const RveArrays *a) {
   int fits = rve_wrap(n, a), changed = 1;
   double *h = head->cell;
@@ -137,7 +139,8 @@ RVE_FN int rve_reduce_cell(RveHead *head, const RveCounts *n, const RveArrays *a
   return fits;
 }
 
-/* ------------------------------------------------------------------------------------------------------------- histories */
+/* -------------------------------------------------------------------------------------------------------------
+ * histories */
 
 /* Copies every contact that has something to remember out of the list. */
 RVE_FN int rve_save_contacts(const RveCounts *n, const RveArrays *a, RveScratch *s) {
@@ -174,7 +177,8 @@ RVE_FN int rve_find_saved(const RveScratch *s, int i, int j, const int p[3], int
   return -1;
 }
 
-/* ---------------------------------------------------------------------------------------------------------------- search */
+/* ----------------------------------------------------------------------------------------------------------------
+ * search */
 
 RVE_FN int rve_add_pair(RveScratch *s, int count, int i, int j, const int p[3]) {
   if (count < s->pairs) {
@@ -185,8 +189,8 @@ RVE_FN int rve_add_pair(RveScratch *s, int count, int i, int j, const int p[3]) 
   return count + 1;
 }
 
-/* Grains sorted along the first direction (buckets, then insertion): order, and coordinates and radii in this order, twice over so
- * that a window may run past the cell's end. */
+/* Grains sorted along the first direction (buckets, then insertion): order, and coordinates and radii in this order,
+ * twice over so that a window may run past the cell's end. */
 RVE_FN void rve_sort_along(const RveHead *head, const RveCounts *n, const RveArrays *a, RveScratch *s) {
   const int grains = n->grains;
   for (int b = 0; b <= grains; b++) s->bucket[b] = 0;
@@ -248,8 +252,8 @@ RVE_FN int rve_search_wide(const RveHead *head, const RveCounts *n, RveScratch *
   return count;
 }
 
-/* Any cell: all images within reach, also of a grain with itself, each pair once: shifts P_x >= 0, then order of grains, and for a
- * grain with itself the half space of shifts. Returns -1 if a shift does not fit. */
+/* Any cell: all images within reach, also of a grain with itself, each pair once: shifts P_x >= 0, then order of
+ * grains, and for a grain with itself the half space of shifts. Returns -1 if a shift does not fit. */
 RVE_FN int rve_search_narrow(const RveHead *head, const RveCounts *n, RveScratch *s, const double window[3]) {
   const int grains = n->grains;
   const double *h = head->cell;
@@ -289,7 +293,8 @@ RVE_FN int rve_search(const RveHead *head, const RveCounts *n, const RveArrays *
   return rve_search_narrow(head, n, s, window);
 }
 
-/* -------------------------------------------------------------------------------------------------------------- new list */
+/* -------------------------------------------------------------------------------------------------------------- new
+ * list */
 
 /* Gives each pair to one of its grains so that out-degrees differ little. */
 RVE_FN void rve_balance(const RveCounts *n, RveScratch *s, int pairs) {
@@ -414,7 +419,8 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
   }
 }
 
-/* Attaches saved histories and bonds to the found pairs; an intact bond stretched out of reach becomes a pair of its own. */
+/* Attaches saved histories and bonds to the found pairs; an intact bond stretched out of reach becomes a pair of its
+ * own. */
 RVE_FN int rve_attach_saved(const RveCounts *n, RveScratch *s, int pairs, int saved) {
   for (int c = 0; c < pairs && saved > 0; c++) {
     int p[3], flipped;
@@ -451,8 +457,8 @@ RVE_FN void rve_choose_skin(const RveCall *call, RveHead *head, int dimension) {
   else if (lasted > 4000.0) head->skin = head->skin / 1.5 > 0.02 * r ? head->skin / 1.5 : 0.02 * r;
 }
 
-/* Reduces the cell, finds all pairs, carries histories over, orders grains. Changes nothing that matters (only wraps) if it returns
- * RVE_LIST_TOO_SMALL with the head's need_* set. */
+/* Reduces the cell, finds all pairs, carries histories over, orders grains. Changes nothing that matters (only wraps)
+ * if it returns RVE_LIST_TOO_SMALL with the head's need_* set. */
 RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts *n, const RveArrays *a, RveScratch *s) {
   int slot_rows, incoming_rows;
   if (!rve_reduce_cell(head, n, a)) return RVE_LIST_FAILED;
@@ -472,7 +478,8 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   if (slot_rows > n->slot_rows || incoming_rows > n->incoming_rows) {
     head->need_pairs = s->pairs;
     head->need_slot_rows = slot_rows > n->slot_rows ? slot_rows + slot_rows / 4 + 4 : n->slot_rows;
-    head->need_incoming_rows = incoming_rows > n->incoming_rows ? incoming_rows + incoming_rows / 4 + 4 : n->incoming_rows;
+    head->need_incoming_rows =
+        incoming_rows > n->incoming_rows ? incoming_rows + incoming_rows / 4 + 4 : n->incoming_rows;
     return RVE_LIST_TOO_SMALL;
   }
   rve_reorder(n, a, s);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The device's functions when no CUDA compiler was there. The CUDA build defines DEMPM_CUDA and brings rve_backend_cuda.cu. */
+/* The device's functions when no CUDA compiler was there. The CUDA build defines DEMPM_CUDA and brings
+ * rve_backend_cuda.cu. */
 #include "rve_backend.h"
 
 #if !defined(DEMPM_CUDA)

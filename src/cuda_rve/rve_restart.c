@@ -67,7 +67,8 @@ static BaseStatus check_header(const StateHeader *header, uint64_t scene_hash, c
     return base_error(BASE_ERROR_FORMAT, "state of an RVE: altered, the checksum differs");
   if (header->scene_hash != scene_hash)
     return base_error(BASE_ERROR_FORMAT,
-                      "state of an RVE: it belongs to another scene (dimension, grain, thickness, density, thermal, bonds, friction)");
+                      "state of an RVE: it belongs to another scene (dimension, grain, thickness, density, thermal, "
+                      "bonds, friction)");
   RveArrays arrays;
   const RveCounts *n = &header->counts;
   if (n->grains < 1 || n->lanes < 1 || n->blocks != (n->grains + n->lanes - 1) / n->lanes ||
@@ -132,8 +133,8 @@ static int ids_are_a_permutation(const RveRecord *record) {
   return 1;
 }
 
-BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, const void *bytes, size_t size, RveRecord *record,
-                             int *canonical) {
+BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, const void *bytes, size_t size,
+                             RveRecord *record, int *canonical) {
   StateHeader header;
   RveRecord fresh, converted;
   if (size < sizeof header) return base_error(BASE_ERROR_FORMAT, "state of an RVE: truncated, %zu bytes", size);
@@ -146,8 +147,9 @@ BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, con
   *canonical = header.counts.lanes != kernels->lanes || header.counts.row != kernels->row[dim] ||
                header.counts.reaction != kernels->reaction[dim];
   if (*canonical) {
-    BaseStatus status = ids_are_a_permutation(&fresh) ? convert(kernels, &fresh, &converted)
-                                                      : base_error(BASE_ERROR_FORMAT, "state of an RVE: ids are out of range");
+    BaseStatus status = ids_are_a_permutation(&fresh)
+                            ? convert(kernels, &fresh, &converted)
+                            : base_error(BASE_ERROR_FORMAT, "state of an RVE: ids are out of range");
     rve_record_destroy(&fresh);
     TRY(status);
     fresh = converted;

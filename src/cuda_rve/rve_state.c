@@ -67,7 +67,8 @@ static void set_grain(const RveScene *scene, const RvePacking *packing, int i, c
 }
 
 /* The packing's contacts with P in wrapped coordinates, as the list keeps them. */
-static BaseStatus packing_contacts(const RveScene *scene, const RvePacking *packing, const RveHead *head, RveContacts *contacts) {
+static BaseStatus packing_contacts(const RveScene *scene, const RvePacking *packing, const RveHead *head,
+                                   RveContacts *contacts) {
   TRY(rve_contacts_create(packing->contacts, contacts));
   for (int c = 0; c < packing->contacts; c++) {
     const int i = packing->contact_pair[2 * c], j = packing->contact_pair[2 * c + 1];
@@ -91,7 +92,8 @@ static BaseStatus packing_contacts(const RveScene *scene, const RvePacking *pack
   return BASE_OK;
 }
 
-static BaseStatus fill_record(const RveScene *scene, const RvePacking *packing, const RveContacts *contacts, RveRecord *record) {
+static BaseStatus fill_record(const RveScene *scene, const RvePacking *packing, const RveContacts *contacts,
+                              RveRecord *record) {
   RveHead *head = rve_head(record->arena);
   const RveArrays *a = &record->arrays;
   for (int i = 0; i < packing->grains; i++) {
@@ -129,7 +131,7 @@ done:
   return status;
 }
 
-/* ------------------------------------------------------------------------------------------------------------- changes */
+/* -------------------------------------------------------------------------------------------------------- changes */
 
 /* Copies grains and list from one layout to another with at least as many rows. */
 static void copy_arena(const RveRecord *from, RveRecord *to) {

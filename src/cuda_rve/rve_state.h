@@ -1,26 +1,28 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* One RVE's state: a head and arrays in one contiguous block of memory ("arena"), the same for all backends.
  *
- * Positions are fractional and fixed-point: int64 in units of 2^-60 cell edges, so that differences are exact. They are not wrapped
- * between neighbour lists; every slot of the list carries its integer image shift P instead: branch = H (s_j - s_i + P).
+ * Positions are fractional and fixed-point: int64 in units of 2^-60 cell edges, so that differences are exact. They are
+ * not wrapped between neighbour lists; every slot of the list carries its integer image shift P instead: branch = H
+ * (s_j - s_i + P).
  *
- * The list. Grains are sorted by degree and dealt in blocks of `lanes`; grain i of block b owns the slots (row, i mod lanes) of the rows
- * slot_first[b] .. slot_first[b+1]. Each contact has exactly one slot, at the grain that "owns" it (degrees are balanced); the other
- * grain finds it in its incoming list. A slot without contact names its own grain, many cells away. */
+ * The list. Grains are sorted by degree and dealt in blocks of `lanes`; grain i of block b owns the slots (row, i mod
+ * lanes) of the rows slot_first[b] .. slot_first[b+1]. Each contact has exactly one slot, at the grain that "owns" it
+ * (degrees are balanced); the other grain finds it in its incoming list. A slot without contact names its own grain,
+ * many cells away. */
 #ifndef DEMPM_RVE_STATE_H
 #define DEMPM_RVE_STATE_H
 
 #include "rve.h"
 #include "rve_team.h"
 
-#define RVE_UNIT 0x1p-60          /* of a cell edge */
+#define RVE_UNIT 0x1p-60           /* of a cell edge */
 #define RVE_ONE (INT64_C(1) << 60) /* a cell edge in units */
 
 enum {
-  RVE_IMAGE_MAX = 5,             /* |P| of a contact in a reduced cell; more means the cell is too narrow */
-  RVE_IMAGE_EMPTY = 6,           /* P_x of an empty slot */
-  RVE_IMAGE_BOND = 1 << 12,      /* intact bond */
-  RVE_IMAGE_VOID = 1 << 13       /* empty slot */
+  RVE_IMAGE_MAX = 5,        /* |P| of a contact in a reduced cell; more means the cell is too narrow */
+  RVE_IMAGE_EMPTY = 6,      /* P_x of an empty slot */
+  RVE_IMAGE_BOND = 1 << 12, /* intact bond */
+  RVE_IMAGE_VOID = 1 << 13  /* empty slot */
 };
 
 enum { RVE_LIST_GOOD, RVE_LIST_CHECK /* its running bound is spent */, RVE_LIST_ABSENT /* must be built */ };
@@ -34,21 +36,21 @@ typedef struct RveCounts {
 
 /* Everything about an RVE that is not an array. Plain values only: it is copied and stored raw. */
 typedef struct RveHead {
-  double cell[9], inverse[9];       /* H, m, and its inverse, 1/m */
+  double cell[9], inverse[9]; /* H, m, and its inverse, 1/m */
   double cell_at_list[9];
-  double rate[9];                   /* D of the last step, 1/s: the present forces of dashpots depend on it */
-  double temperature, scale;        /* radius = scale * reference radius */
+  double rate[9];            /* D of the last step, 1/s: the present forces of dashpots depend on it */
+  double temperature, scale; /* radius = scale * reference radius */
   double scale_at_list;
-  double reach;                     /* m: no grain's fluctuation has moved further since the list was built */
-  double stretch;                   /* the affine flow has shortened no length by more than this factor since then */
-  double skin;                      /* m: pairs within (R_i + R_j) scale_at_list + skin are in the list */
-  double radius_max, radius_min;    /* m, reference */
+  double reach;                       /* m: no grain's fluctuation has moved further since the list was built */
+  double stretch;                     /* the affine flow has shortened no length by more than this factor since then */
+  double skin;                        /* m: pairs within (R_i + R_j) scale_at_list + skin are in the list */
+  double radius_max, radius_min;      /* m, reference */
   double friction_work, damping_work; /* J since creation */
-  double critical_time_step;        /* s */
+  double critical_time_step;          /* s */
   int64_t steps, rebuilds, steps_at_list;
-  int64_t done;                     /* steps of the present call; not 0 only while waiting for a larger arena */
-  int32_t list_due;                 /* RVE_LIST_*: what must happen before the next contact pass */
-  int32_t failed;                   /* BASE_ERROR_UNSTABLE after the watchdog spoke, for ever */
+  int64_t done;     /* steps of the present call; not 0 only while waiting for a larger arena */
+  int32_t list_due; /* RVE_LIST_*: what must happen before the next contact pass */
+  int32_t failed;   /* BASE_ERROR_UNSTABLE after the watchdog spoke, for ever */
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
   int32_t pad[2];
@@ -56,24 +58,25 @@ typedef struct RveHead {
 
 /* Arrays of an arena. N = blocks * lanes grains (the last ones are massless padding). [k] counts components. */
 typedef struct RveArrays {
-  int64_t *position[3];   /* [N] */
+  int64_t *position[3]; /* [N] */
   int64_t *position_at_list[3];
-  double *velocity[3];    /* [N] m/s, fluctuation, half a step behind the position */
-  double *spin[3];        /* [N] rad/s relative to the affine flow's vorticity; 2D: [0] is about z */
+  double *velocity[3];          /* [N] m/s, fluctuation, half a step behind the position */
+  double *spin[3];              /* [N] rad/s relative to the affine flow's vorticity; 2D: [0] is about z */
   double *force[3], *torque[3]; /* [N] of own slots only; 2D: torque[0] */
   double *radius, *reference_radius, *mass, *inverse_mass, *inverse_inertia; /* [N] */
-  int32_t *id;            /* [N] index of the grain in its packing; -1 padding */
-  double *row;            /* [N][counts.row] what neighbours read: 2D s v | w r m; 3D s r | v m | w */
-  uint32_t *neighbour;    /* [slot] j (times counts.row if rows exist) */
-  uint16_t *image;        /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
-  double *shear[3];       /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
-  double *reaction;       /* [slot + lanes][counts.reaction] force and torque on the neighbour; the last ones stay zero */
-  double *reaction_field[6]; /* the same as arrays, if counts.reaction = 0 */
-  uint32_t *incoming;     /* [incoming] slot (times counts.reaction) */
+  int32_t *id;         /* [N] index of the grain in its packing; -1 padding */
+  double *row;         /* [N][counts.row] what neighbours read: 2D s v | w r m; 3D s r | v m | w */
+  uint32_t *neighbour; /* [slot] j (times counts.row if rows exist) */
+  uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
+  double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
+  double *reaction;    /* [slot + lanes][counts.reaction] force and torque on the neighbour; the last ones stay zero */
+  double *reaction_field[6];            /* the same as arrays, if counts.reaction = 0 */
+  uint32_t *incoming;                   /* [incoming] slot (times counts.reaction) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
 } RveArrays;
 
-/* What all steps of one call share. Deformation is given per DEM step: gradient * dt may differ from L * duration / steps. */
+/* What all steps of one call share. Deformation is given per DEM step: gradient * dt may differ from L * duration /
+ * steps. */
 typedef struct RveCall {
   int64_t steps;
   double dt;
@@ -90,8 +93,8 @@ typedef struct RveCall {
   int32_t thermal, rotation;
   double expansion, reference_temperature, pipe_resistance;
   double bond_strength, bond_shear_ratio, bond_melting_temperature;
-  double skin_fraction;        /* of the largest radius; 0: found from the time that lists last */
-  double thickness;            /* 1 in 3D */
+  double skin_fraction; /* of the largest radius; 0: found from the time that lists last */
+  double thickness;     /* 1 in 3D */
 } RveCall;
 
 /* Which parts of the kernel a scene needs; constants in the stamped-out variants. */
@@ -108,8 +111,8 @@ typedef struct RveScratch {
   uint16_t *old_image;
   double *old_shear[3];
   int32_t *chain, *order, *bucket, *out, *in, *rank, *place; /* [N + 2] */
-  double *sorted[4];                 /* [2 N + 64] fractional coordinates and radius, sorted along the first */
-  double *swap;                      /* [N] */
+  double *sorted[4]; /* [2 N + 64] fractional coordinates and radius, sorted along the first */
+  double *swap;      /* [N] */
 } RveScratch;
 
 RVE_ANY void *rve_carve(void *base, size_t *used, size_t bytes) {

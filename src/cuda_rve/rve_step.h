@@ -17,8 +17,9 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
     double h[9];
     for (int i = 0; i < 3; i++)
       for (int j = 0; j < 3; j++)
-        h[3 * i + j] = head->cell[3 * i + j] + (call->step_map[3 * i] * head->cell[j] + call->step_map[3 * i + 1] * head->cell[3 + j] +
-                                                call->step_map[3 * i + 2] * head->cell[6 + j]);
+        h[3 * i + j] = head->cell[3 * i + j] +
+                       (call->step_map[3 * i] * head->cell[j] + call->step_map[3 * i + 1] * head->cell[3 + j] +
+                        call->step_map[3 * i + 2] * head->cell[6 + j]);
     for (int k = 0; k < 9; k++) head->cell[k] = h[k];
     rve_invert(h, head->inverse);
     head->stretch /= call->shorten;
@@ -29,7 +30,8 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
   head->steps++;
   head->done++;
   head->list_due = rve_list_is_spent(head) ? RVE_LIST_CHECK : RVE_LIST_GOOD;
-  /* A grain that crosses half a small grain in one step is out of control, whatever the scene. NaN fails the test too. */
+  /* A grain that crosses half a small grain in one step is out of control, whatever the scene. NaN fails the test too.
+   */
   if (!(sqrt(fastest) * call->dt <= 0.5 * head->radius_min * head->scale)) head->failed = BASE_ERROR_UNSTABLE;
 }
 
@@ -46,8 +48,8 @@ RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCount
 }
 
 /* Looks whether the list is really spent (the running bound is a sum of maxima); if so, builds the next. */
-RVE_FN RveOutcome rve_renew_list(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
-                                 const RveArrays *a, RveScratch *s) {
+RVE_FN RveOutcome rve_renew_list(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head,
+                                 const RveCounts *n, const RveArrays *a, RveScratch *s) {
   const int check = head->list_due == RVE_LIST_CHECK && head->need_pairs == 0;
   rve_sync(); /* all have read the head before the leader changes it */
   if (check) {
@@ -74,7 +76,8 @@ RVE_FN RveOutcome rve_renew_list(RveFeatures ft, const RveTeam *team, const RveC
   return RVE_DONE;
 }
 
-/* Runs call->steps steps, or goes on with them. call->steps = 0: forces of the present state (after a change from outside). */
+/* Runs call->steps steps, or goes on with them. call->steps = 0: forces of the present state (after a change from
+ * outside). */
 RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
                           const RveArrays *a, RveScratch *s) {
   const double from = head->temperature, steps = (double)(call->steps - head->done);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Who computes an RVE, and on how many lanes: the only file that asks which compiler reads it.
  *
- * The kernels are written once over `rve_real`, a pack of RVE_LANES grains. On a CPU it is one vector register and a team is
- * one thread; in CUDA it is one number per thread, a pack is a warp and a team is a thread block. Lists are laid out for
- * packs of RVE_PACK grains.
+ * The kernels are written once over `rve_real`, a pack of RVE_LANES grains. On a CPU it is one vector register and a
+ * team is one thread; in CUDA it is one number per thread, a pack is a warp and a team is a thread block. Lists are
+ * laid out for packs of RVE_PACK grains.
  *
- * CPUs also keep what a neighbour must know of a grain in one row (array of structures): loading rows and transposing them
- * is faster than gathers. CUDA reads the arrays themselves. */
+ * CPUs also keep what a neighbour must know of a grain in one row (array of structures): loading rows and transposing
+ * them is faster than gathers. CUDA reads the arrays themselves. */
 #ifndef DEMPM_RVE_TEAM_H
 #define DEMPM_RVE_TEAM_H
 
@@ -15,9 +15,9 @@
 #include <string.h>
 
 typedef struct RveTeam {
-  int pack, packs;    /* this pack's number, and how many packs work side by side */
-  int leader;         /* 1 for the one thread that runs the serial parts */
-  double *shared;     /* CUDA: one double per warp, for reductions */
+  int pack, packs; /* this pack's number, and how many packs work side by side */
+  int leader;      /* 1 for the one thread that runs the serial parts */
+  double *shared;  /* CUDA: one double per warp, for reductions */
 } RveTeam;
 
 /* RVE_ANY: host and device; RVE_FN: inlined part of a kernel; RVE_PART: a kernel's part worth a call of its own. */
@@ -40,10 +40,13 @@ typedef struct RveTeam {
 #include <immintrin.h>
 typedef __m256d RveFour; /* four consecutive fields of a row */
 #else
-typedef struct RveFour { double f[4]; } RveFour;
+typedef struct RveFour {
+  double f[4];
+} RveFour;
 #endif
 
-/* ------------------------------------------------------------------------------------------------ numbers, one per lane */
+/* ------------------------------------------------------------------------------------------------ numbers, one per
+ * lane */
 #if defined(RVE_ISA_AVX512)
 
 enum { RVE_LANES = 8, RVE_PACK = 8, RVE_ROWS = 1 };
@@ -119,7 +122,8 @@ RVE_FN rve_mask rve_int_any_bit(rve_int a, rve_int bits) {
 RVE_FN rve_int rve_int_clear(rve_mask m, rve_int a, rve_int bits) {
   return _mm256_andnot_si256(_mm256_and_si256(_mm256_castpd_si256(m), bits), a);
 }
-/* AVX2 has no 64-bit conversions: the high and the low 32 bits go through the mantissa of a large number; one rounding. */
+/* AVX2 has no 64-bit conversions: the high and the low 32 bits go through the mantissa of a large number; one rounding.
+ */
 RVE_FN rve_real rve_real_from_int(rve_int a) {
   __m256i high = _mm256_blend_epi16(_mm256_srai_epi32(a, 16), _mm256_setzero_si256(), 0x33);
   high = _mm256_add_epi64(high, _mm256_castpd_si256(_mm256_set1_pd(0x3p67)));
@@ -221,15 +225,18 @@ RVE_FN rve_real rve_inverse_sqrt(rve_real a) { /* 14 bits, doubled twice: half t
 RVE_FN rve_real rve_inverse_sqrt(rve_real a) { return rve_set(1.0) / rve_sqrt(a); }
 #endif
 
-/* ------------------------------------------------------------------------- rows of four fields, transposed into lanes */
-typedef struct RveQuad { rve_real f[4]; } RveQuad;
+/* --------------------------------------------------------------------- rows of four fields, transposed into lanes */
+typedef struct RveQuad {
+  rve_real f[4];
+} RveQuad;
 
 #if defined(RVE_ISA_AVX512)
 RVE_FN RveQuad rve_transpose(const RveFour row[RVE_PACK]) {
   RveQuad q;
   rve_real r[4];
   for (int k = 0; k < 4; k++) r[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(row[k]), row[k + 4], 1);
-  const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
+                second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   const rve_real a = _mm512_unpacklo_pd(r[0], r[1]), b = _mm512_unpackhi_pd(r[0], r[1]);
   const rve_real c = _mm512_unpacklo_pd(r[2], r[3]), d = _mm512_unpackhi_pd(r[2], r[3]);
   q.f[0] = _mm512_permutex2var_pd(a, first, c);
@@ -239,7 +246,8 @@ RVE_FN RveQuad rve_transpose(const RveFour row[RVE_PACK]) {
   return q;
 }
 RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_PACK]) {
-  const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
+                second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   const rve_real a = _mm512_unpacklo_pd(q.f[0], q.f[1]), b = _mm512_unpackhi_pd(q.f[0], q.f[1]);
   const rve_real c = _mm512_unpacklo_pd(q.f[2], q.f[3]), d = _mm512_unpackhi_pd(q.f[2], q.f[3]);
   const rve_real r[4] = {_mm512_permutex2var_pd(a, first, c), _mm512_permutex2var_pd(b, first, d),
@@ -293,8 +301,8 @@ RVE_FN void rve_transpose_back(RveQuad q, RveFour row[1]) {
 }
 #endif
 
-/* Four fields of the grains (or slots) that `offset` names, one per lane. rows: array of structures, offsets count doubles;
- * field: the same as four arrays, for teams without rows (NULL entries are read as 0). */
+/* Four fields of the grains (or slots) that `offset` names, one per lane. rows: array of structures, offsets count
+ * doubles; field: the same as four arrays, for teams without rows (NULL entries are read as 0). */
 RVE_FN RveQuad rve_gather(const double *rows, const double *const field[4], const uint32_t *offset, int lane0) {
 #if defined(__CUDACC__)
   RveQuad q;
@@ -343,7 +351,8 @@ RVE_FN RveQuad rve_read_rows(const double *rows, int stride, const double *const
 }
 
 /* Per lane: the sum of the rows that offset[(first..last) * RVE_PACK + lane] name, in this order. */
-RVE_FN RveQuad rve_sum_rows(const double *rows, const double *const field[4], const uint32_t *offset, int first, int last) {
+RVE_FN RveQuad rve_sum_rows(const double *rows, const double *const field[4], const uint32_t *offset, int first,
+                            int last) {
 #if defined(__CUDACC__)
   RveQuad q = {{0.0, 0.0, 0.0, 0.0}};
   (void)rows;
@@ -376,7 +385,8 @@ RVE_FN double rve_team_reduce(const RveTeam *team, rve_real a, int want_max) {
   if (RVE_LANE == 0) team->shared[team->pack] = a;
   __syncthreads();
   double all = team->shared[0];
-  for (int p = 1; p < team->packs; p++) all = want_max ? (all > team->shared[p] ? all : team->shared[p]) : all + team->shared[p];
+  for (int p = 1; p < team->packs; p++)
+    all = want_max ? (all > team->shared[p] ? all : team->shared[p]) : all + team->shared[p];
   return all;
 }
 #else
@@ -390,7 +400,8 @@ RVE_FN double rve_team_reduce(const RveTeam *team, rve_real a, int want_max) {
   return all;
 }
 #endif
-/* Over all lanes of the team, in a fixed order; every thread gets the result. A NaN may hide in a maximum, never in a sum. */
+/* Over all lanes of the team, in a fixed order; every thread gets the result. A NaN may hide in a maximum, never in a
+ * sum. */
 RVE_FN double rve_team_sum(const RveTeam *team, rve_real a) { return rve_team_reduce(team, a, 0); }
 RVE_FN double rve_team_max(const RveTeam *team, rve_real a) { return rve_team_reduce(team, a, 1); }
 

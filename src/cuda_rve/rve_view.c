@@ -50,7 +50,7 @@ static void spin_of(const RveRecord *record, int q, double w[3]) {
     for (int k = 0; k < 3; k++) w[k] = a->spin[k][q];
 }
 
-/* ---------------------------------------------------------------------------------------------------------------- view */
+/* ----------------------------------------------------------------------------------------------------------- view */
 
 void rve_view_destroy(RveView *view) {
   if (!view) return;
@@ -106,7 +106,8 @@ BaseStatus rve_record_view(const RveRecord *record, RveView *view) {
     double s[3];
     fractional(record, q, s);
     for (int k = 0; k < 3; k++)
-      view->position[3 * i + k] = head->cell[3 * k] * s[0] + head->cell[3 * k + 1] * s[1] + head->cell[3 * k + 2] * s[2];
+      view->position[3 * i + k] =
+          head->cell[3 * k] * s[0] + head->cell[3 * k + 1] * s[1] + head->cell[3 * k + 2] * s[2];
     view->radius[i] = a->radius[q];
     for (int k = 0; k < record->counts.dimension; k++) view->velocity[3 * i + k] = a->velocity[k][q];
     spin_of(record, q, view->spin + 3 * i);
@@ -118,7 +119,7 @@ BaseStatus rve_record_view(const RveRecord *record, RveView *view) {
   return BASE_OK;
 }
 
-/* ------------------------------------------------------------------------------------------------------------- packing */
+/* -------------------------------------------------------------------------------------------------------- packing */
 
 static BaseStatus alloc_packing(int grains, int contacts, RvePacking *packing) {
   const size_t n = (size_t)grains, c = (size_t)contacts;
@@ -171,7 +172,7 @@ BaseStatus rve_record_packing(const RveRecord *record, RvePacking *packing) {
   return BASE_OK;
 }
 
-/* ---------------------------------------------------------------------------------------------------------- conduction */
+/* ----------------------------------------------------------------------------------------------------- conduction */
 
 typedef struct Network {
   int contacts;
@@ -230,10 +231,12 @@ BaseStatus rve_record_conduct(const RveRecord *record, const RveScene *scene, do
   if (!(scene->grain_heat_capacity > 0.0))
     return base_error(BASE_ERROR_ARGUMENT, "grain_heat_capacity = %g (allowed: > 0)", scene->grain_heat_capacity);
   if (!(time_step > 0.0) || steps < 0)
-    return base_error(BASE_ERROR_ARGUMENT, "time_step = %g, steps = %lld (allowed: > 0, >= 0)", time_step, (long long)steps);
+    return base_error(BASE_ERROR_ARGUMENT, "time_step = %g, steps = %lld (allowed: > 0, >= 0)", time_step,
+                      (long long)steps);
   BaseStatus status = network_create(record, scene, &network, &limit);
   if (status == BASE_OK && time_step > limit)
-    status = base_error(BASE_ERROR_ARGUMENT, "time_step = %g s (allowed: at most min m c / sum h = %g s)", time_step, limit);
+    status =
+        base_error(BASE_ERROR_ARGUMENT, "time_step = %g s (allowed: at most min m c / sum h = %g s)", time_step, limit);
   if (status == BASE_OK)
     for (int64_t k = 0; k < steps; k++) network_step(&network, record->counts.grains, time_step, temperature);
   network_destroy(&network);

@@ -83,12 +83,14 @@ int main(int argc, char **argv) {
     rve_batch_destroy(batch);
   }
   qsort(seconds, 3, sizeof *seconds, compare);
-  printf("%s %dD %d grains: %.2f million particle-steps/s (median of 3; best %.2f), %d steps per call\n", name, dimension,
-         packing.grains, 1e-6 * (double)packing.grains * (double)answer.steps / seconds[1],
+  printf("%s %dD %d grains: %.2f million particle-steps/s (median of 3; best %.2f), %d steps per call\n", name,
+         dimension, packing.grains, 1e-6 * (double)packing.grains * (double)answer.steps / seconds[1],
          1e-6 * (double)packing.grains * (double)answer.steps / seconds[0], per_call);
-  printf("  sxx %.2f syy %.2f szz %.2f sxy %.3f (tension positive), Z %.3f, unbalanced %.2e, friction %.4e J, lists %lld\n",
-         answer.stress[0], answer.stress[1], answer.stress[2], answer.stress[3], answer.coordination, answer.unbalanced,
-         answer.friction_work, (long long)answer.rebuilds);
+  printf(
+      "  sxx %.2f syy %.2f szz %.2f sxy %.3f (tension positive), Z %.3f, unbalanced %.2e, friction %.4e J, lists "
+      "%lld\n",
+      answer.stress[0], answer.stress[1], answer.stress[2], answer.stress[3], answer.coordination, answer.unbalanced,
+      answer.friction_work, (long long)answer.rebuilds);
   rve_packing_destroy(&packing);
   return 0;
 }

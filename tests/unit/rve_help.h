@@ -20,9 +20,9 @@
 #include "base/tensor.h"
 #include "cuda_rve/rve.h"
 
-#define MUST(expression)                                                          \
-  do {                                                                            \
-    if ((expression) != BASE_OK) fail_msg("%s: %s", #expression, base_error_message()); \
+#define MUST(expression)                                                                                               \
+  do {                                                                                                                 \
+    if ((expression) != BASE_OK) fail_msg("%s: %s", #expression, base_error_message());                                \
   } while (0)
 
 #define HELP __attribute__((unused)) static

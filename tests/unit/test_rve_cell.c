@@ -95,7 +95,8 @@ static int count_misses(const ImageCase *c, const RveView *view) {
       const int i = view->pair[2 * v], j = view->pair[2 * v + 1], sign = i <= j ? 1 : -1;
       const int owner = i <= j ? i * GRAINS_MAX + j : j * GRAINS_MAX + i;
       if (owner != c->owner[b]) continue;
-      found |= same_branch(view->branch + 3 * v, c->branch[b], sign) || (i == j && same_branch(view->branch + 3 * v, c->branch[b], -1.0));
+      found |= same_branch(view->branch + 3 * v, c->branch[b], sign) ||
+               (i == j && same_branch(view->branch + 3 * v, c->branch[b], -1.0));
     }
     misses += !found;
   }
@@ -136,8 +137,8 @@ static void no_periodic_image_is_missed(void **state) {
     }
     for (int k = 0; k < CELLS_PER_BATCH; k++) rve_packing_destroy(&cases[k].packing);
   }
-  print_message("           A2: %d cells, %ld contacts, %ld of a grain with its own image, %ld misses\n", CELLS, contacts, images,
-                misses);
+  print_message("           A2: %d cells, %ld contacts, %ld of a grain with its own image, %ld misses\n", CELLS,
+                contacts, images, misses);
   assert_int_equal(misses, 0);
   assert_true(images > CELLS / 10);
 }
@@ -186,10 +187,11 @@ static void no_contact_is_missed_in_motion(void **state) {
   print_message("           A2: %ld contacts in motion, %ld lists, 0 misses\n", contacts, rebuilds);
 }
 
-/* ------------------------------------------------------------------------------------------------- A3: extreme shear */
+/* ---------------------------------------------------------------------------------------------- A3: extreme shear */
 
 /* Stress of a crystal of one grain and kt = 0 in any cell: all lattice vectors shorter than 2R. */
-static void lattice_stress(const double cell[9], int dim, double radius, double kn, double thickness, double stress[6]) {
+static void lattice_stress(const double cell[9], int dim, double radius, double kn, double thickness,
+                           double stress[6]) {
   double full[9] = {0.0};
   const int range = 12;
   const double volume = fabs(tensor_determinant(cell)) * thickness;
@@ -229,9 +231,11 @@ static double extreme_crystal(HelpLattice lattice, int pure) {
     for (int m = 0; m < 9; m++) total[m] += gradient[m]; /* all gradients of a run commute */
     tensor_exponential(total, 1.0, f);
     tensor_multiply(f, packing.cell, cell);
-    lattice_stress(cell, scene.dimension, radius, scene.normal_stiffness, scene.dimension == 2 ? scene.thickness : 1.0, expected);
+    lattice_stress(cell, scene.dimension, radius, scene.normal_stiffness, scene.dimension == 2 ? scene.thickness : 1.0,
+                   expected);
     /* Relative to kn / length scale: the stress itself passes through 0 when the crystal comes apart. */
-    const double scale = fmax(help_largest(6, expected), 0.01 * scene.normal_stiffness / (scene.dimension == 2 ? scene.thickness : 0.01));
+    const double scale = fmax(help_largest(6, expected),
+                              0.01 * scene.normal_stiffness / (scene.dimension == 2 ? scene.thickness : 0.01));
     for (int m = 0; m < 6; m++) error = fmax(error, fabs(answer.stress[m] - expected[m]) / scale);
   }
   rve_batch_destroy(batch);
@@ -253,15 +257,17 @@ static void crystals_answer_with_the_lattice_sum_at_any_shear(void **state) {
 static void skew(int a, int b, int t, RvePacking *packing) {
   for (int k = 0; k < 3; k++) packing->cell[3 * k + a] += t * packing->cell[3 * k + b];
   for (int i = 0; i < packing->grains; i++) packing->position[3 * i + b] -= t * packing->position[3 * i + a];
-  for (int c = 0; c < packing->contacts; c++) packing->contact_image[3 * c + b] -= t * packing->contact_image[3 * c + a];
+  for (int c = 0; c < packing->contacts; c++)
+    packing->contact_image[3 * c + b] -= t * packing->contact_image[3 * c + a];
 }
 
 /* Positions leave the unit cell by skewing; a packing has them in [-0.5, 0.5). */
 static void wrap(RvePacking *packing) {
   for (int c = 0; c < packing->contacts; c++)
     for (int k = 0; k < packing->dimension; k++)
-      packing->contact_image[3 * c + k] += (int)floor(packing->position[3 * packing->contact_pair[2 * c + 1] + k] + 0.5) -
-                                           (int)floor(packing->position[3 * packing->contact_pair[2 * c] + k] + 0.5);
+      packing->contact_image[3 * c + k] +=
+          (int)floor(packing->position[3 * packing->contact_pair[2 * c + 1] + k] + 0.5) -
+          (int)floor(packing->position[3 * packing->contact_pair[2 * c] + k] + 0.5);
   for (int i = 0; i < packing->grains; i++)
     for (int k = 0; k < packing->dimension; k++) {
       double *s = &packing->position[3 * i + k];
@@ -275,14 +281,15 @@ static double sum_of_shear(const RveBatch *batch) {
   double sum = 0.0;
   MUST(rve_batch_view(batch, 0, &view));
   for (int c = 0; c < view.contacts; c++)
-    sum += sqrt(view.force_shear[3 * c] * view.force_shear[3 * c] + view.force_shear[3 * c + 1] * view.force_shear[3 * c + 1] +
+    sum += sqrt(view.force_shear[3 * c] * view.force_shear[3 * c] +
+                view.force_shear[3 * c + 1] * view.force_shear[3 * c + 1] +
                 view.force_shear[3 * c + 2] * view.force_shear[3 * c + 2]);
   rve_view_destroy(&view);
   return sum;
 }
 
-/* A frictional packing under shear up to gamma = 10: at many stages its state in a heavily skewed cell, which the engine must reduce at
- * once, gives the same stress and the same tangential forces. */
+/* A frictional packing under shear up to gamma = 10: at many stages its state in a heavily skewed cell, which the
+ * engine must reduce at once, gives the same stress and the same tangential forces. */
 static void reduction_keeps_stress_and_histories(void **state) {
   (void)state;
   double error = 0.0, history = 0.0;
@@ -314,7 +321,8 @@ static void reduction_keeps_stress_and_histories(void **state) {
   }
   help_report("A3 largest change of a frictional stress across a reduction", error);
   help_report("A3 largest change of the tangential forces across a reduction", history);
-  /* 1e-12 asked; the detour over a packing's double positions costs 2e-17 of a cell over overlaps of 1e-3 radii, 1e-12. */
+  /* 1e-12 asked; the detour over a packing's double positions costs 2e-17 of a cell over overlaps of 1e-3 radii, 1e-12.
+   */
   assert_true(error <= 1e-12);
   assert_true(history <= 1e-12);
 }

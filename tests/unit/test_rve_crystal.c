@@ -16,14 +16,16 @@ typedef struct Expected {
   double stress[6], conductivity[6];
 } Expected;
 
-/* Sums over the branches of one primitive cell, deformed by F = exp(gradient): normal force from the length, tangential force from one
- * step of relative motion kt (1 - n n) D b, D = sym gradient. */
-static Expected closed_form(HelpLattice lattice, const RveScene *scene, double overlap, double expansion, const double gradient[9]) {
+/* Sums over the branches of one primitive cell, deformed by F = exp(gradient): normal force from the length, tangential
+ * force from one step of relative motion kt (1 - n n) D b, D = sym gradient. */
+static Expected closed_form(HelpLattice lattice, const RveScene *scene, double overlap, double expansion,
+                            const double gradient[9]) {
   double branch[HELP_NEIGHBOURS][3], cell[9], f[9], stress[9] = {0.0}, conductivity[9] = {0.0};
   const int contacts = help_branches(lattice, branch, cell), dim = help_dimension(lattice);
   const double length0 = 2.0 * radius * (1.0 - overlap);
   tensor_exponential(gradient, 1.0, f);
-  const double volume = tensor_determinant(cell) * pow(length0, dim) * tensor_determinant(f) * (dim == 2 ? scene->thickness : 1.0);
+  const double volume =
+      tensor_determinant(cell) * pow(length0, dim) * tensor_determinant(f) * (dim == 2 ? scene->thickness : 1.0);
   for (int c = 0; c < contacts; c++) {
     double b[3], force[3], length = 0.0, along = 0.0, moved[3];
     for (int i = 0; i < 3; i++)
@@ -50,7 +52,8 @@ static Expected closed_form(HelpLattice lattice, const RveScene *scene, double o
 }
 
 /* Largest relative error over TRIALS random deformations in one DEM step each. */
-static void compare_crystal(HelpLattice lattice, int copies, double kt, double *stress_error, double *conductivity_error) {
+static void compare_crystal(HelpLattice lattice, int copies, double kt, double *stress_error,
+                            double *conductivity_error) {
   const double overlap = 0.02;
   RveScene scene = help_scene(help_dimension(lattice));
   RvePacking packing = help_crystal(lattice, copies, radius, overlap);
@@ -120,7 +123,8 @@ static void table(HelpLattice lattice, double kn, double kt, double l, double c[
   if (lattice == HELP_CUBIC) c[0] = kn / l, c[1] = 0.0, c[2] = kt / (2.0 * l);
 }
 
-/* Bonded, just touching crystals: half the difference of the stresses under +-strain is linear elasticity up to strain^2. */
+/* Bonded, just touching crystals: half the difference of the stresses under +-strain is linear elasticity up to
+ * strain^2. */
 static void small_strain_moduli_are_those_of_the_table(void **state) {
   (void)state;
   double error = 0.0;

@@ -21,13 +21,15 @@ static void cross(const double a[3], const double b[3], double c[3]) {
 }
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* Power put into contacts, and rate of kinetic energy of fluctuations and spins by m dv/dt = f - m L v, I dw/dt = t; from the state's
- * forces and velocities. */
-static void powers(const RveScene *scene, const RveView *view, const double gradient[9], double *contact, double *kinetic) {
+/* Power put into contacts, and rate of kinetic energy of fluctuations and spins by m dv/dt = f - m L v, I dw/dt = t;
+ * from the state's forces and velocities. */
+static void powers(const RveScene *scene, const RveView *view, const double gradient[9], double *contact,
+                   double *kinetic) {
   *contact = *kinetic = 0.0;
   for (int c = 0; c < view->contacts; c++) {
     const int i = view->pair[2 * c], j = view->pair[2 * c + 1];
-    const double *b = view->branch + 3 * c, length = sqrt(dot(b, b)), overlap = view->radius[i] + view->radius[j] - length;
+    const double *b = view->branch + 3 * c, length = sqrt(dot(b, b)),
+                 overlap = view->radius[i] + view->radius[j] - length;
     const double ci = view->radius[i] - 0.5 * overlap, cj = view->radius[j] - 0.5 * overlap;
     double n[3], f[3], u[3], w[3], turn[3], torque[3];
     for (int k = 0; k < 3; k++) {
@@ -47,7 +49,8 @@ static void powers(const RveScene *scene, const RveView *view, const double grad
   for (int i = 0; i < view->grains; i++) {
     const double *v = view->velocity + 3 * i;
     double lv[3];
-    for (int k = 0; k < 3; k++) lv[k] = gradient[3 * k] * v[0] + gradient[3 * k + 1] * v[1] + gradient[3 * k + 2] * v[2];
+    for (int k = 0; k < 3; k++)
+      lv[k] = gradient[3 * k] * v[0] + gradient[3 * k + 1] * v[1] + gradient[3 * k + 2] * v[2];
     *kinetic -= mass_of(scene, view->radius[i]) * dot(v, lv);
   }
 }
@@ -87,8 +90,8 @@ typedef struct Ledger {
   double heat_error, damping, friction;
 } Ledger;
 
-/* Runs DEM step by DEM step; work by the trapezoidal rule over steps. Kinetic energy lives at half steps: the mean of two is taken at the
- * ends. */
+/* Runs DEM step by DEM step; work by the trapezoidal rule over steps. Kinetic energy lives at half steps: the mean of
+ * two is taken at the ends. */
 static Ledger run_ledger(int dim, double kt, double friction, double viscosity, double local) {
   RvePacking packing = help_random(dim, dim == 2 ? 10 : 5, dim == 2 ? 2e4 : 1e5, 33);
   RveScene scene = help_scene(dim);
@@ -144,7 +147,7 @@ static void energy_is_accounted_for(void **state) {
   assert_true(heat <= 1e-12);
 }
 
-/* ------------------------------------------------------------------------------------------------------ A7: time step */
+/* -------------------------------------------------------------------------------------------------- A7: time step */
 
 static double run_crystal(double fraction, int steps, int *unstable, double *drift) {
   RveScene scene = help_scene(2);
@@ -182,7 +185,8 @@ static void the_critical_time_step_is_the_limit(void **state) {
   const double base = run_crystal(0.1, 20000, &unstable, &drift);
   help_report("A7 energy band at 0.1 of the critical step", drift);
   assert_false(unstable);
-  /* Half-step kinetic plus full-step elastic energy ripples by w dt / 2 of the fastest mode: 0.1, on an offset by the initial overlap. */
+  /* Half-step kinetic plus full-step elastic energy ripples by w dt / 2 of the fastest mode: 0.1, on an offset by the
+   * initial overlap. */
   const double high = run_crystal(0.98, 100000, &unstable, &drift);
   assert_false(unstable);
   assert_true(high < 30.0 * base); /* bounded: near the limit the ripple is 1 / (1 - 0.98^2) = 25 times the energy */
@@ -216,14 +220,17 @@ static void a_collision_restores_speed_and_a_dashpot_takes_its_part(void **state
     RveView view;
     const RveAnswer before = help_step(batch, still, 0.0, 0.0), after = help_step(batch, still, 0.0, 5e-3);
     MUST(rve_batch_view(batch, 0, &view));
-    /* Linear spring and dashpot with adhesion at the end (as LIGGGHTS without limitForce) until the overlap is 0 again. */
+    /* Linear spring and dashpot with adhesion at the end (as LIGGGHTS without limitForce) until the overlap is 0 again.
+     */
     const double restitution = damped ? exp(-pi * fraction / sqrt(1.0 - fraction * fraction)) : 1.0;
-    assert_true(fabs(-view.velocity[0] / speed / restitution - 1.0) < 1e-2); /* first order in the step of the dashpot */
-    if (damped) { /* what the dashpot took is what is missing */
+    assert_true(fabs(-view.velocity[0] / speed / restitution - 1.0) <
+                1e-2); /* first order in the step of the dashpot */
+    if (damped) {      /* what the dashpot took is what is missing */
       const double lost = before.kinetic_energy - after.kinetic_energy;
       assert_true(fabs(after.damping_work / lost - 1.0) < 1e-2);
     } else {
-      assert_true(fabs(-view.velocity[0] / speed - 1.0) < 1e-4); /* ends of the contact: second order in a step of 1/500 */
+      assert_true(fabs(-view.velocity[0] / speed - 1.0) <
+                  1e-4); /* ends of the contact: second order in a step of 1/500 */
     }
     assert_true(fabs(view.velocity[0] + view.velocity[3]) < 1e-15); /* momentum */
     assert_true(after.heat == 0.0 && after.friction_work == 0.0);
@@ -251,9 +258,11 @@ static void a_sliding_collision_conserves_angular_momentum_and_heats(void **stat
   for (int t = 0; t < 2; t++)
     for (int i = 0; i < 2; i++) {
       const double *x = views[t]->position + 3 * i, *v = views[t]->velocity + 3 * i;
-      spin[t] += mass_of(&scene, 5e-3) * (x[0] * v[1] - x[1] * v[0]) + inertia_of(&scene, 5e-3) * views[t]->spin[3 * i + 2];
+      spin[t] +=
+          mass_of(&scene, 5e-3) * (x[0] * v[1] - x[1] * v[0]) + inertia_of(&scene, 5e-3) * views[t]->spin[3 * i + 2];
     }
-  assert_true(fabs(spin[1] - spin[0]) <= 1e-10 * fabs(spin[0])); /* levers meet at one point: exact but for rounded positions */
+  assert_true(fabs(spin[1] - spin[0]) <=
+              1e-10 * fabs(spin[0])); /* levers meet at one point: exact but for rounded positions */
   assert_true(last.coordination == 0.0 && last.friction_work > 0.0);
   /* Sliding throughout: momentum change mu times the normal one. */
   const double dvt = fabs(after.velocity[1] - before.velocity[1]), dvn = fabs(after.velocity[0] - before.velocity[0]);

@@ -28,7 +28,8 @@ static void stretched_rve_is_a_stressless_gas_and_comes_back(void **state) {
     const RveAnswer start = help_step(batch, NULL, 0.0, 0.0), gas = run(batch, out, 0.0, 5e-4, 100);
     assert_true(gas.coordination == 0.0 && gas.elastic_energy == 0.0 && gas.modulus == 0.0);
     /* No contacts: what is left is the kinetic stress of slow grains, 2 K / V at most. */
-    for (int m = 0; m < 6; m++) assert_true(fabs(gas.stress[m]) <= 2.0 * gas.kinetic_energy / gas.volume * (1.0 + 1e-12));
+    for (int m = 0; m < 6; m++)
+      assert_true(fabs(gas.stress[m]) <= 2.0 * gas.kinetic_energy / gas.volume * (1.0 + 1e-12));
     for (int m = 0; m < 6; m++) assert_true(fabs(gas.stress[m]) <= 1e-3 * fabs(start.stress[0]));
     assert_true(fabs(gas.volume / start.volume / pow(2.0, dim) - 1.0) < 1e-12);
     const RveAnswer again = run(batch, in, 0.0, 5e-4, 100);
@@ -52,7 +53,8 @@ static void a_crystal_touches_again_as_at_first_load(void **state) {
   const RveAnswer apart = run(batch, out, 0.0, 1e-4, 50);
   assert_true(apart.coordination == 0.0);
   const RveAnswer again = run(batch, in, 0.0, 1e-4, 50);
-  assert_true(help_difference(6, again.stress, start.stress) < 1e-10); /* lengths differ by round-off of 1e-14 over 1e-3 */
+  assert_true(help_difference(6, again.stress, start.stress) <
+              1e-10); /* lengths differ by round-off of 1e-14 over 1e-3 */
   rve_batch_destroy(batch);
   rve_packing_destroy(&packing);
 }
@@ -101,7 +103,8 @@ static void an_rve_that_runs_away_is_reported_and_keeps_its_last_answer(void **s
   rve_packing_destroy(&packing);
 }
 
-/* ----------------------------------------------------------------------------------------------------------------- bonds */
+/* -----------------------------------------------------------------------------------------------------------------
+ * bonds */
 
 static RveBatch *bonded(const RveScene *scene, const RvePacking *packing) {
   RveBatch *batch = help_batch(scene, packing);
@@ -154,7 +157,8 @@ static void bonds_break_under_shear(void **state) {
   scene.substeps = 1;
   shear[1] = shear[3] = 5e-4;
   RveBatch *batch = bonded(&scene, &packing);
-  /* F_t = kt 2R e_xy per contact (pure shear, no spin by symmetry) reaches mu_b F_nb at e_xy = 0.5 1e-2 1e6 R / (5e5 2R) = 5e-3. */
+  /* F_t = kt 2R e_xy per contact (pure shear, no spin by symmetry) reaches mu_b F_nb at e_xy = 0.5 1e-2 1e6 R / (5e5
+   * 2R) = 5e-3. */
   RveAnswer answer = help_step(batch, NULL, 0.0, 0.0);
   for (int k = 1; k <= 12; k++) {
     answer = help_step(batch, shear, 0.0, 1.0);
@@ -212,7 +216,8 @@ static void long_bonds_survive_new_lists(void **state) {
   rve_packing_destroy(&packing);
 }
 
-/* ------------------------------------------------------------------------------------------------------------------ heat */
+/* ------------------------------------------------------------------------------------------------------------------
+ * heat */
 
 static void two_grains_exchange_heat_exponentially(void **state) {
   (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Batches: the same bits for every thread count, batch size and order; states packed and restored; instruction sets; refusals. */
+/* Batches: the same bits for every thread count, batch size and order; states packed and restored; instruction sets;
+ * refusals. */
 #include "rve_help.h"
 
 enum { RVES = 7, CALLS = 12 };
@@ -50,7 +51,8 @@ static void answers_do_not_depend_on_threads_batches_or_order(void **state) {
   for (int dim = 2; dim <= 3; dim++) {
     RvePacking packings[2];
     RveAnswer first[RVES], again[RVES];
-    for (int k = 0; k < 2; k++) packings[k] = help_random(dim, dim == 2 ? 9 : 5, dim == 2 ? 2e4 : 1e5, 40 + (uint64_t)k);
+    for (int k = 0; k < 2; k++)
+      packings[k] = help_random(dim, dim == 2 ? 9 : 5, dim == 2 ? 2e4 : 1e5, 40 + (uint64_t)k);
     run_all(packings, dim, 1, RVES, 0, first);
     const int trials[4][3] = {{2, RVES, 0}, {4, RVES, 3}, {1, 1, 5}, {2, 3, 2}};
     for (int t = 0; t < 4; t++) {
@@ -62,7 +64,7 @@ static void answers_do_not_depend_on_threads_batches_or_order(void **state) {
   }
 }
 
-/* --------------------------------------------------------------------------------------------------- pack and unpack */
+/* ------------------------------------------------------------------------------------------------ pack and unpack */
 
 static void *pack(const RveBatch *batch, int rve, size_t *size) {
   void *bytes = malloc(rve_batch_state_bytes(batch, rve));
@@ -212,18 +214,18 @@ static void packings_carry_history(void **state) {
   }
 }
 
-/* ---------------------------------------------------------------------------------------------------------- refusals */
+/* ------------------------------------------------------------------------------------------------------- refusals */
 
 static void refuse(RveScene scene, const char *name) {
   assert_int_equal(rve_scene_check(&scene), BASE_ERROR_ARGUMENT);
   if (!strstr(base_error_message(), name)) fail_msg("\"%s\" does not name %s", base_error_message(), name);
 }
 
-#define REFUSE(entry, value)            \
-  do {                                  \
-    RveScene wrong = good;              \
-    wrong.entry = (value);              \
-    refuse(wrong, #entry);              \
+#define REFUSE(entry, value)                                                                                           \
+  do {                                                                                                                 \
+    RveScene wrong = good;                                                                                             \
+    wrong.entry = (value);                                                                                             \
+    refuse(wrong, #entry);                                                                                             \
   } while (0)
 
 static void wrong_scenes_are_refused_by_name(void **state) {
@@ -285,7 +287,8 @@ static void wrong_calls_are_refused(void **state) {
   assert_int_equal(rve_batch_create(&other, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &none), BASE_ERROR_ARGUMENT);
   assert_null(none);
   assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 0, RVE_BACKEND_CPU, &none), BASE_ERROR_ARGUMENT);
-  assert_int_equal(rve_batch_create(&scene, &packing, 1, &wrong_packing, 1, RVE_BACKEND_CPU, &none), BASE_ERROR_ARGUMENT);
+  assert_int_equal(rve_batch_create(&scene, &packing, 1, &wrong_packing, 1, RVE_BACKEND_CPU, &none),
+                   BASE_ERROR_ARGUMENT);
   rve_batch_destroy(NULL);
   rve_batch_destroy(batch);
   rve_packing_destroy(&packing);
