@@ -48,10 +48,9 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
                         "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "backend", "threads"});
-  std::vector<std::string> files;
   while (parser.next()) {
     if (parser.is("packing")) {
-      do files.push_back(parser.word("the name of a file with a periodic packing"));
+      do packing_files_.push_back(parser.word("the name of a file with a periodic packing"));
       while (parser.has_value());
     } else if (parser.is("model")) parser.choice({"hooke/stiffness"});
     else if (parser.is("tangential")) tangential_ = parser.choice({"off", "history"}) == 1;
@@ -72,7 +71,7 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
     else if (parser.is("threads")) scene_.threads = parser.integer(0, 4096);
   }
   check_keywords(parser);
-  read_packings(files);
+  read_packings(0.0);
 }
 
 void FixMPMRve::check_keywords(const KeywordParser &parser) {
@@ -111,11 +110,16 @@ void FixMPMRve::read_bonds(KeywordParser &parser) {
   scene_.bond_melting_temperature = parser.accept("none") ? HUGE_VAL : parser.number(NumberRange::any());
 }
 
-void FixMPMRve::read_packings(const std::vector<std::string> &files) {
+/* A restart file of LIGGGHTS keeps tangential displacements: without their stiffness (0) contacts start with none, far from
+ * equilibrium if the packing was made with friction. */
+void FixMPMRve::read_packings(double tangential_stiffness) {
+  const std::vector<std::string> &files = packing_files_;
+  for (RvePacking &packing : packings_) rve_packing_destroy(&packing);
   packings_.resize(files.size());
   memset(packings_.data(), 0, files.size() * sizeof(RvePacking));
   for (size_t k = 0; k < files.size(); k++) {
-    BaseStatus status = rve_packing_read(files[k].c_str(), scene_.dimension, &packings_[k]);
+    BaseStatus status =
+        rve_packing_read_history(files[k].c_str(), scene_.dimension, tangential_stiffness, &packings_[k]);
     if (status == BASE_OK) status = rve_packing_check(&packings_[k]);
     if (status != BASE_OK) base_error_context(status, "keyword 'packing', file %s: ", files[k].c_str());
     fix_check(lmp, this, status);
@@ -172,6 +176,7 @@ void FixMPMRve::prepare(const char *user, int type, bool thermal) {
     fix_check(lmp, this, rve_law_set_scene(law_, &scene));
     return;
   }
+  if (scene.tangential_stiffness > 0.0) read_packings(scene.tangential_stiffness);
   fix_check(lmp, this, rve_law_create(world, &scene, packings_.data(), (int)packings_.size(), backend_, &law_));
   if (!restart_state_.empty()) {
     fix_check(lmp, this, rve_law_unpack(law_, restart_state_.data(), restart_state_.size()));

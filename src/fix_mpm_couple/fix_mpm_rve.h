@@ -57,6 +57,7 @@ class FixMPMRve : public Fix {
  private:
   RveScene scene_;
   bool tangential_;
+  std::vector<std::string> packing_files_;
   std::vector<RvePacking> packings_;
   RveBackend backend_;
   RveLaw *law_;
@@ -68,7 +69,7 @@ class FixMPMRve : public Fix {
   void check_keywords(const class KeywordParser &);
   void read_damping(class KeywordParser &);
   void read_bonds(class KeywordParser &);
-  void read_packings(const std::vector<std::string> &files);
+  void read_packings(double tangential_stiffness);
   void read_properties(RveScene &scene, int type, bool thermal) const;
   void check_dem_time_step(const RveScene &scene) const;
   void carry_out_pending();
