@@ -139,9 +139,9 @@ test-gpu: $(TESTS)
 SANITIZED = $(MAKE) BUILD=$(BUILD)/sanitize OPT="-O1 -g -fno-omit-frame-pointer" NVCC= \
             SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
 sanitize:
-	$(SANITIZED) test-unit
+	+$(SANITIZED) test-unit
 fuzz:
-	$(SANITIZED) run-fuzzers
+	+$(SANITIZED) run-fuzzers
 run-fuzzers: $(FUZZERS)
 	$(foreach f,$(FUZZERS),DEMPM_TEST_DATA=tests/data $(f) &&) true
 bench: programs $(BENCHES)
