@@ -38,6 +38,7 @@ typedef struct MpmScene {
   double mass_cutoff;     /* nodes below this fraction of their largest point's mass move with the points' field but
                            * carry no force; default 1e-30 */
   int threads;            /* 0 = OpenMP's own choice */
+  int gimp_stretch; /* 1: the domains of uGIMP follow the points' stretch, at most a cell wide; default 0, undeformed */
 } MpmScene;
 MpmScene mpm_scene_default(void);
 BaseStatus mpm_scene_check(const MpmScene *scene);

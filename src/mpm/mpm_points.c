@@ -68,9 +68,19 @@ void mpm_points_free(Mpm *mpm) {
   memset(p, 0, sizeof *p);
 }
 
-/* Half of the point's domain over h. Clamped: size0 may exceed the spacing by round-off. */
+/* Half of the point's domain over h. Clamped: size0 may exceed the spacing by round-off. A domain that follows the
+ * stretch has the length of F's row, weighted by the edges: right for any stretch along the axes, and the same after a
+ * rotation. */
 static double half_edge(const Mpm *mpm, const MpmPoint *point, int axis) {
-  const double half = 0.5 * point->size0[axis] * mpm->inverse_spacing;
+  double half = 0.5 * point->size0[axis] * mpm->inverse_spacing;
+  if (mpm->scene.gimp_stretch) {
+    double square = 0.0;
+    for (int j = 0; j < mpm->scene.dimension; j++) {
+      const double edge = point->deformation_gradient[3 * axis + j] * point->size0[j];
+      square += edge * edge;
+    }
+    half = fmax(0.5 * sqrt(square) * mpm->inverse_spacing, 1e-6);
+  }
   return half < 0.5 ? half : 0.5;
 }
 

@@ -54,6 +54,7 @@ BaseStatus mpm_scene_check(const MpmScene *scene) {
   TRY(check_number("grid_damping", scene->grid_damping, 0.0, 1e300));
   TRY(check_number("mass_cutoff", scene->mass_cutoff, 0.0, 1e-3));
   TRY(check_integer("threads", scene->threads, 0, 4096));
+  TRY(check_integer("gimp_stretch", scene->gimp_stretch, 0, scene->shape == MPM_SHAPE_GIMP));
   if (!scene->mechanical && !scene->thermal)
     return base_error(BASE_ERROR_ARGUMENT, "scene: mechanical and thermal are both 0; at least one must be 1");
   return BASE_OK;

@@ -40,6 +40,7 @@ static void wrong_scenes_are_refused(void **state) {
   REFUSED(grid_damping, NAN, "grid_damping", "nan");
   REFUSED(mass_cutoff, 0.5, "mass_cutoff", "0.5");
   REFUSED(threads, -1, "threads", "-1");
+  REFUSED(gimp_stretch, 2, "gimp_stretch", "0 to 1");
   REFUSED(mechanical, 0, "mechanical", "thermal");
   MpmScene scene = valid_scene();
   scene.transfer = MPM_TRANSFER_XPIC, scene.xpic_order = 11;
