@@ -36,9 +36,10 @@ def environment(threads=1):
     return {**os.environ, **settings}
 
 
-def execute(command, cwd=None, timeout=120, threads=1):
+def execute(command, cwd=None, timeout=120, threads=1, extra=None):
     """Runs a command; returns (exit code, stdout + stderr). After `timeout` seconds it is ended and the test fails."""
-    process = subprocess.Popen([str(word) for word in command], cwd=cwd, env=environment(threads), text=True,
+    process = subprocess.Popen([str(word) for word in command], cwd=cwd, text=True,
+                               env={**environment(threads), **(extra or {})},
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                errors="replace", start_new_session=True)
     try:
