@@ -35,7 +35,7 @@ FixMPMCouple::FixMPMCouple(LAMMPS *lammps, int narg, char **arg) : Fix(lammps, n
 
   time_integrate = 1;
   create_attribute = 1;
-  restart_global = restart_peratom = 1;
+  restart_global = restart_peratom = restart_file = 1;
   scalar_flag = vector_flag = 1;
   size_vector = TOTALS;
   extscalar = extvector = 0;

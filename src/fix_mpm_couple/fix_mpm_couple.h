@@ -88,6 +88,7 @@ class FixMPMCouple : public Fix {
   int size_restart(int);
   int maxsize_restart();
   void write_restart(FILE *);
+  void write_restart_file(char *);
   void restart(char *);
 
   /* The fix mpm/couple called `mpm_id`, for `asking`, a fix that belongs to it. Ends the program if there is none. */

@@ -7,6 +7,7 @@
 #include "fix_mpm_couple.h"
 #include "memory.h"
 #include "rank_error.h"
+#include "restart_seal.h"
 
 using namespace LAMMPS_NS;
 
@@ -70,6 +71,14 @@ struct CoupleRecord {
   int64_t columns, last_number;
 };
 static const char RECORD_MAGIC[8] = {'m', 'p', 'm', 'c', 'o', 'u', 'p', '1'};
+
+/* LIGGGHTS has closed the file. A file that cannot be sealed is no reason to lose the run, but to warn. */
+void FixMPMCouple::write_restart_file(char *file) {
+  int failed = 0;
+  if (comm->me == 0 && !strchr(file, '%')) failed = restart_seal(file) != BASE_OK;
+  MPI_Bcast(&failed, 1, MPI_INT, 0, world);
+  if (failed) fix_warning(lmp, this, base_error_message());
+}
 
 void FixMPMCouple::write_restart(FILE *file) {
   if (comm->me != 0) return;
