@@ -68,7 +68,7 @@ def report(case, grains):
           f"{(table['front'].max() - width) / width:.2f}, largest kinetic energy {table['mpm[5]'].max():.0f} J/m")
     for name, values in ledger.items():
         print(f"  {name:24s} {values[-1]:10.1f} J/m  {100 * values[-1] / released:7.2f} % of the released potential energy")
-    print(f"  {'sum':24s} {balance:10.1f} J/m  {100 * balance / released:7.2f} % (minus what the FLIP/PIC blend dissipates)")
+    print(f"  {'sum':24s} {balance:10.1f} J/m  {100 * balance / released:7.2f} % (what the FLIP/PIC blend dissipates; 0 with pure FLIP)")
     print(f"  heat through the hot wall {table['left[7]'][-1]:.1f} J/m, momentum against impulses "
           f"{momentum_error(case, table):.1e}")
 
