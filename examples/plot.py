@@ -183,7 +183,7 @@ def draw_points(axes, run, frame, name, norm, plane):
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     corners = np.stack([np.stack([x + a * half, y + b * half], axis=1) for a, b in signs], axis=1)
     squares = collections.PolyCollection(corners, array=frame.field(name)[order], norm=norm, cmap=FIELDS[name][2],
-                                          linewidths=0)
+                                          edgecolors="face", linewidths=0.5)
     return axes.add_collection(squares)
 
 
