@@ -374,7 +374,7 @@ def draw_rve(axes, path):
         axes.add_collection(collections.EllipseCollection(
             2 * radius, 2 * radius, np.zeros(len(x)), offsets=x + shift, units="xy", offset_transform=axes.transData,
             facecolors=colour[0], edgecolors=colour[1], linewidths=0.4, zorder=1 if not shift.any() else 0))
-    if contacts.GetNumberOfLines() > 0:
+    if contacts is not None and contacts.GetNumberOfLines() > 0:  # a packing without contacts has no such block
         ends = vtk_to_numpy(contacts.GetPoints().GetData())[:, :2].reshape(-1, 2, 2)
         force = vtk_to_numpy(contacts.GetCellData().GetArray("force_normal"))
         bond = vtk_to_numpy(contacts.GetCellData().GetArray("bond")) != 0
