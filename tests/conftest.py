@@ -8,6 +8,7 @@ a hang is the worst answer a program can give on several ranks.
 import os
 import pathlib
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -36,12 +37,17 @@ def environment(threads=1):
     return {**os.environ, **settings}
 
 
+def bound_files():
+    """A program that repeats a message for ever also fills its log: it ends there, not in the memory of the test."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 28, 1 << 28))
+
+
 def execute(command, cwd=None, timeout=120, threads=1, extra=None):
     """Runs a command; returns (exit code, stdout + stderr). After `timeout` seconds it is ended and the test fails."""
     process = subprocess.Popen([str(word) for word in command], cwd=cwd, text=True,
                                env={**environment(threads), **(extra or {})},
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                               errors="replace", start_new_session=True)
+                               errors="replace", start_new_session=True, preexec_fn=bound_files)
     try:
         output, _ = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:

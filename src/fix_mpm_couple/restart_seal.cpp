@@ -45,6 +45,45 @@ Seal seal_of(const char *bytes, size_t size) {
   return seal;
 }
 
+/* Kinds of the header's values by flag, as LIGGGHTS' WriteRestart::header writes them: string, int, bigint, double. */
+const char HEADER_KINDS[] = "siiisbiiiiiiiiiiiiiiiisbibiibiibiibiiddddddddddddddd";
+const int ATOM_STYLE_FLAG = 22, NATOMS_FLAG = 23;
+const size_t LEAST_BYTES_PER_ATOM = 11 * sizeof(double); /* size, x, tag, type, mask, image, v: every atom style packs these */
+
+template <typename T>
+bool take(const std::vector<char> &bytes, size_t &at, T &value) {
+  if (bytes.size() - at < sizeof value) return false;
+  memcpy(&value, bytes.data() + at, sizeof value);
+  at += sizeof value;
+  return true;
+}
+
+/* Whether the file ends inside the header of a LIGGGHTS restart file, or is too short for the atoms that the header announces.
+ * This is all that shows of a file that ends before the names of its fixes. What is not understood counts as whole. */
+bool ends_early(const std::vector<char> &bytes) {
+  size_t at = 0;
+  int64_t atoms = 0;
+  for (;;) {
+    int32_t flag = 0, value = 0;
+    int64_t wide = 0;
+    if (!take(bytes, at, flag)) return true;
+    if (flag == -1) break;
+    if (flag < 0 || flag >= (int)strlen(HEADER_KINDS)) return false;
+    const char kind = HEADER_KINDS[flag];
+    if (kind != 's') {
+      if (!(kind == 'i' ? take(bytes, at, value) : take(bytes, at, wide))) return true;
+      if (flag == NATOMS_FLAG) atoms = wide;
+      continue;
+    }
+    if (!take(bytes, at, value)) return true;
+    if (value <= 0) return false;
+    if ((size_t)value > bytes.size() - at) return true;
+    if (flag == ATOM_STYLE_FLAG && strncmp(bytes.data() + at, "hybrid", (size_t)value) == 0) return false;
+    at += (size_t)value;
+  }
+  return atoms > 0 && (bytes.size() - at) / LEAST_BYTES_PER_ATOM < (uint64_t)atoms;
+}
+
 }  // namespace
 
 BaseStatus LAMMPS_NS::restart_seal(const char *file) {
@@ -61,7 +100,7 @@ BaseStatus LAMMPS_NS::restart_seal(const char *file) {
 
 BaseStatus LAMMPS_NS::restart_check(const char *file) {
   std::vector<char> bytes;
-  if (!read_whole(file, bytes) || !holds_points(bytes)) return BASE_OK;
+  if (!read_whole(file, bytes) || !(holds_points(bytes) || ends_early(bytes))) return BASE_OK;
   Seal found;
   if (bytes.size() > sizeof found) {
     const size_t size = bytes.size() - sizeof found;

@@ -14,8 +14,9 @@ namespace LAMMPS_NS {
 /* Appends the seal and syncs the file to disk. One rank calls. BASE_ERROR_FILE. */
 BaseStatus restart_seal(const char *file);
 
-/* BASE_ERROR_FORMAT if the file holds material points (names one of our fixes) and has no seal, or not the right one. Files of other
- * programs pass, and so does one that cannot be opened: LIGGGHTS says so itself. One rank calls. */
+/* BASE_ERROR_FORMAT if the file holds material points (names one of our fixes) and has no seal, or not the right one; also if it
+ * ends before it could name a fix (LIGGGHTS would read its end over and over). Files of other programs pass, and so does one that
+ * cannot be opened: LIGGGHTS says so itself. One rank calls. */
 BaseStatus restart_check(const char *file);
 
 /* The file that LIGGGHTS' read_restart means: `name`, or, if it has a *, the one with the largest number in its place. "" if none. */

@@ -22,7 +22,7 @@ def whole(dempm, tmp_path):
 
 
 @pytest.mark.parametrize("np", [1, 2])
-@pytest.mark.parametrize("fault", ["cut to 3 %", "cut to 50 %", "last byte cut", "one bit altered"])
+@pytest.mark.parametrize("fault", ["cut to 0 %", "cut to 0.1 %", "cut to 0.5 %", "cut to 3 %", "cut to 50 %", "last byte cut", "one bit altered"])
 def test_a_broken_restart_file_is_refused(fault, np, whole, dempm, tmp_path):
     broken = bytearray(whole)
     if fault == "one bit altered":
@@ -30,7 +30,7 @@ def test_a_broken_restart_file_is_refused(fault, np, whole, dempm, tmp_path):
     elif fault == "last byte cut":
         broken = broken[:-1]
     else:
-        broken = broken[:len(whole) * int(fault.split()[2]) // 100]
+        broken = broken[:int(len(whole) * float(fault.split()[2]) / 100)]
     (tmp_path / "broken.200").write_bytes(broken)
     run = dempm(SECOND.format(file="broken.200", steps=10), np=np, cwd=tmp_path, check=False, timeout=30)
     assert run.code != 0
