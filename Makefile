@@ -53,10 +53,11 @@ CXX_SOURCES := $(filter-out %/main.cpp,$(wildcard src/fix_mpm_couple/*.cpp))
 CU_SOURCES := $(if $(NVCC),$(wildcard src/cuda_rve/*.cu))
 # The RVE kernels once per instruction set, chosen at run time. All lanes run the same code: contraction is safe there.
 KERNEL_SOURCE := $(wildcard src/cuda_rve/rve_backend_cpu.c)
-ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512)
+ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512 avx512_mixed)
 ISA_plain = -ffp-contract=fast
 ISA_avx2 = -ffp-contract=fast -mavx2 -mfma
 ISA_avx512 = -ffp-contract=fast -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512
+ISA_avx512_mixed = $(ISA_avx512)
 KERNEL_OBJECTS := $(if $(KERNEL_SOURCE),$(ISAS:%=$(BUILD)/isa/%.o))
 
 LIBRARY := $(BUILD)/libdempm.a

@@ -10,6 +10,7 @@
 #define RVE_NUMBER_plain 1
 #define RVE_NUMBER_avx2 2
 #define RVE_NUMBER_avx512 3
+#define RVE_NUMBER_avx512_mixed 4
 #define RVE_NUMBER_OF(isa) RVE_NUMBER_##isa
 #define RVE_NUMBER(isa) RVE_NUMBER_OF(isa)
 #if RVE_NUMBER(RVE_ISA) == 1
@@ -18,6 +19,9 @@
 #define RVE_ISA_AVX2 1
 #elif RVE_NUMBER(RVE_ISA) == 3
 #define RVE_ISA_AVX512 1
+#elif RVE_NUMBER(RVE_ISA) == 4
+#define RVE_ISA_AVX512 1
+#define RVE_MIXED 1
 #endif
 
 #include "rve_backend.h"
@@ -75,4 +79,9 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
   measure_table[ft.dimension - 2][variant_of(ft)](call, arena, n, work, duration, answer);
 }
 
-const RveKernels RVE_NAME(RVE_ISA) = {RVE_TEXT(RVE_ISA), RVE_PACK, {8, 12}, {4, 8}, run, measure};
+#ifdef RVE_MIXED
+#define ROWS {4, 8}, {2, 4}
+#else
+#define ROWS {8, 12}, {4, 8}
+#endif
+const RveKernels RVE_NAME(RVE_ISA) = {RVE_TEXT(RVE_ISA), RVE_PACK, ROWS, run, measure};

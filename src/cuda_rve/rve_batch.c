@@ -23,12 +23,12 @@ struct RveBatch {
   int threads;
   Workspace *workspace;
   RveDeviceJob *job; /* [count] on a device */
-  char name[16];
+  char name[24];
 };
 
 /* -------------------------------------------------------------------------------------------------- which kernels */
 
-static const RveKernels *choose_kernels(void) {
+static const RveKernels *choose_kernels(const RveScene *scene) {
   const RveKernels *best = &rve_kernels_plain;
 #if defined(__x86_64__)
   const char *wanted = getenv("DEMPM_ISA");
@@ -36,7 +36,7 @@ static const RveKernels *choose_kernels(void) {
   const int has512 = has2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
                      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
   if (has2) best = &rve_kernels_avx2;
-  if (has512) best = &rve_kernels_avx512;
+  if (has512) best = scene->mixed ? &rve_kernels_avx512_mixed : &rve_kernels_avx512;
   if (wanted && strcmp(wanted, "plain") == 0) best = &rve_kernels_plain;
   if (wanted && strcmp(wanted, "avx2") == 0 && has2) best = &rve_kernels_avx2;
 #endif
@@ -147,7 +147,7 @@ static int threads_of(const RveBatch *batch) {
 }
 
 static BaseStatus choose_backend(RveBatch *batch, RveBackend backend) {
-  batch->kernels = choose_kernels();
+  batch->kernels = choose_kernels(&batch->scene);
   strcpy(batch->name, "cpu/");
   strcat(batch->name, batch->kernels->name);
   if (backend == RVE_BACKEND_CPU || (backend == RVE_BACKEND_AUTO && !rve_device_present())) return BASE_OK;

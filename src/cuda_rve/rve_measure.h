@@ -54,21 +54,20 @@ RVE_FN void rve_add_fourth(int dim, rve_real sum[15], const rve_real n[3], rve_r
 }
 
 /* One row of slots. The force is that of the last contact pass, read back from the reactions. */
-RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const RveContactPass *c, const RveCounts *counts,
+RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real h[9], const RveCounts *counts,
                             const RveArrays *a, const RveBody *own, int lane0, RveSums *sum) {
   const int dim = ft.dimension;
   const RveBody other = rve_neighbour_body(ft, a, lane0);
   const rve_int image = rve_load_short(a->image, lane0);
-  const rve_real zero = rve_set(0.0), one = rve_set(1.0), half = rve_set(0.5);
+  const rve_real zero = rve_set(0.0), one = rve_set(1.0);
   rve_real d[3], n[3], f[3];
-  rve_branch(dim, c->h, own->s, other.s, image, d);
+  rve_branch(dim, h, own->s, other.s, image, d);
   const rve_real length = rve_sqrt(rve_dot(dim, d, d)), overlap = own->r + other.r - length;
   const rve_mask bonded = rve_int_any_bit(image, rve_set_int(RVE_IMAGE_BOND));
   const rve_mask touch = rve_or(rve_less(zero, overlap), bonded);
   for (int k = 0; k < dim; k++) n[k] = rve_keep(touch, d[k] / length), d[k] = rve_keep(touch, d[k]);
-  const double *const field[4] = {a->reaction_field[0], a->reaction_field[1], dim == 3 ? a->reaction_field[2] : 0, 0};
-  const RveQuad q = rve_read_rows(a->reaction, counts->reaction, field, lane0);
-  for (int k = 0; k < dim; k++) f[k] = zero - q.f[k];
+  rve_read_reaction(dim, counts, a, lane0, f);
+  for (int k = 0; k < dim; k++) f[k] = zero - f[k];
   rve_add_dyad(dim, sum->of.stress, f, d);
   sum->of.force = sum->of.force + rve_sqrt(rve_dot(dim, f, f));
   rve_add_dyad(dim, sum->of.fabric, n, n);
@@ -81,7 +80,7 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const RveContac
   rve_add_fourth(dim, sum->of.fourth, n, l * l);
   sum->of.contacts = sum->of.contacts + rve_keep(touch, one);
   sum->of.bonds = sum->of.bonds + rve_keep(bonded, one);
-  sum->of.elastic = sum->of.elastic + rve_keep(touch, half * c->kn * overlap * overlap);
+  sum->of.elastic = sum->of.elastic + rve_keep(touch, rve_set(0.5 * call->normal_stiffness) * overlap * overlap);
   if (ft.tangential && call->tangential_stiffness > 0.0)
     for (int k = 0; k < rve_spins(ft); k++) {
       const rve_real shear = rve_load(a->shear[k], lane0);
@@ -89,11 +88,11 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const RveContac
     }
 }
 
-RVE_FN void rve_sum_grains(RveFeatures ft, const RveArrays *a, int block, const RveBody *own, RveSums *sum) {
-  const int dim = ft.dimension, lane0 = block * RVE_PACK;
+RVE_FN void rve_sum_grains(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *own, RveSums *sum) {
+  const int dim = ft.dimension;
   rve_real f[3], t[3], p[3];
   const rve_real m = rve_load(a->mass, lane0), im = rve_load(a->inverse_inertia, lane0), half = rve_set(0.5);
-  rve_sum_reactions(ft, a, block, f, t);
+  rve_sum_reactions(ft, n, a, lane0, f, t);
   for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0), p[k] = rve_set(0.0) - m * own->v[k];
   sum->of.resultant = sum->of.resultant + rve_sqrt(rve_dot(dim, f, f));
   rve_add_dyad(dim, sum->of.stress, p, own->v);
@@ -187,15 +186,17 @@ RVE_FN int rve_answer_is_finite(const RveAnswer *x) {
 /* Measures and answers. A state that is not finite leaves *answer as it was, but for its status, and fails the RVE. */
 RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
                         const RveArrays *a, double work_before, double duration, RveAnswer *answer) {
-  const RveContactPass c = rve_contact_pass_of(call, head, 0.0);
   const RveFeatures all = {ft.dimension, ft.tangential, 1, ft.bonds}; /* velocities are needed below */
+  rve_real h[9];
+  for (int k = 0; k < 9; k++) h[k] = rve_set(head->cell[k] * RVE_UNIT);
   RveSums sum;
   for (int k = 0; k < RVE_SUMS; k++) sum.all[k] = rve_set(0.0);
-  for (int block = team->pack; block < n->blocks; block += team->packs) {
-    const RveBody own = rve_own_body(all, a, block * RVE_PACK);
+  for (int span = team->pack; span < n->blocks * RVE_PARTS; span += team->packs) {
+    const int block = span / RVE_PARTS, part = span % RVE_PARTS * RVE_SPAN;
+    const RveBody own = rve_own_body(all, a, span * RVE_SPAN);
     for (int row = a->slot_first[block]; row < a->slot_first[block + 1]; row++)
-      rve_sum_contact(ft, call, &c, n, a, &own, row * RVE_PACK, &sum);
-    rve_sum_grains(ft, a, block, &own, &sum);
+      rve_sum_contact(ft, call, h, n, a, &own, row * RVE_PACK + part, &sum);
+    rve_sum_grains(ft, n, a, span * RVE_SPAN, &own, &sum);
   }
   RveTotals total;
   for (int k = 0; k < RVE_SUMS; k++) total.all[k] = rve_team_sum(team, sum.all[k]);

@@ -57,11 +57,11 @@ RVE_FN int rve_list_is_spent(const RveHead *head) { return !(2.0 * head->reach <
 /* Largest true fluctuation displacement since the list, m. */
 RVE_FN double rve_farthest(int dim, const RveTeam *team, const RveHead *head, const RveCounts *n, const RveArrays *a) {
   rve_real farthest = rve_set(0.0);
-  for (int block = team->pack; block < n->blocks; block += team->packs) {
+  for (int span = team->pack; span < n->blocks * RVE_PARTS; span += team->packs) {
     rve_real x[3], square = rve_set(0.0);
     for (int k = 0; k < dim; k++)
-      x[k] = rve_real_from_int(rve_int_subtract(rve_load_int(a->position[k], block * RVE_PACK),
-                                                rve_load_int(a->position_at_list[k], block * RVE_PACK)));
+      x[k] = rve_real_from_int(rve_int_subtract(rve_load_int(a->position[k], span * RVE_SPAN),
+                                                rve_load_int(a->position_at_list[k], span * RVE_SPAN)));
     for (int i = 0; i < dim; i++) {
       rve_real d = rve_set(0.0);
       for (int k = 0; k < dim; k++) d = d + rve_set(head->cell[3 * i + k] * RVE_UNIT) * x[k];
@@ -382,7 +382,7 @@ RVE_FN void rve_reorder(const RveCounts *n, const RveArrays *a, RveScratch *s) {
 
 /* Writes slots, histories and incoming lists of the new order. */
 RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s, int pairs) {
-  const int stride = n->row ? n->row : 1, reaction = n->reaction ? n->reaction : 1, spins = n->dimension == 2 ? 1 : 3;
+  const int stride = n->row ? n->row : 1, width = n->reaction ? n->reaction / (n->dimension - 1) : 1, spins = n->dimension == 2 ? 1 : 3;
   int slots = 0, incoming = 0;
   for (int block = 0; block < n->blocks; block++) {
     int out = 0, in = 0;
@@ -398,7 +398,7 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
       for (int k = 0; k < spins; k++) a->shear[k][slot] = 0.0;
     }
     for (int e = incoming * RVE_PACK; e < (incoming + in) * RVE_PACK; e++) /* the reaction that stays zero */
-      a->incoming[e] = (uint32_t)(n->slot_rows * RVE_PACK * reaction);
+      a->incoming[e] = (uint32_t)(n->slot_rows * RVE_PACK * width);
     slots += out, incoming += in;
   }
   a->slot_first[n->blocks] = slots, a->incoming_first[n->blocks] = incoming;
@@ -408,7 +408,8 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
     const int slot = (a->slot_first[i / RVE_PACK] + s->out[i]++) * RVE_PACK + i % RVE_PACK;
     a->neighbour[slot] = (uint32_t)(j * stride);
     a->image[slot] = s->image[c];
-    a->incoming[(a->incoming_first[j / RVE_PACK] + s->in[j]++) * RVE_PACK + j % RVE_PACK] = (uint32_t)(slot * reaction);
+    a->incoming[(a->incoming_first[j / RVE_PACK] + s->in[j]++) * RVE_PACK + j % RVE_PACK] =
+        (uint32_t)(rve_place(RVE_PACK, slot) * width);
     if (old < 0) continue;
     /* Seen from the other grain the force changes sign; in 2D the tangent (-n_y, n_x) does too. */
     const double sign = n->dimension == 3 && s->first[c] == s->old_second[old] &&

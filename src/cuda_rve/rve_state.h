@@ -31,7 +31,7 @@ typedef struct RveCounts {
   int32_t dimension, grains, lanes, blocks;
   int32_t slot_rows, incoming_rows; /* capacity, in rows of `lanes` */
   int32_t row;                      /* doubles per grain's row, a multiple of 4; 0: no rows (CUDA) */
-  int32_t reaction;                 /* doubles per slot's reaction, a multiple of 4; 0: six arrays instead */
+  int32_t reaction;                 /* doubles per slot's reaction: 4 in FP64, 2 in FP32, twice that in 3D; 0: arrays */
 } RveCounts;
 
 /* Everything about an RVE that is not an array. Plain values only: it is copied and stored raw. */
@@ -69,9 +69,10 @@ typedef struct RveArrays {
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist) */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
-  double *reaction;    /* [slot + lanes][counts.reaction] force and torque on the neighbour; the last ones stay zero */
+  double *reaction;    /* [plane][slot + lanes] four numbers each: force and torque on the neighbour (2D f t, 3D f t_x |
+                          t_y t_z), at rve_place() of the slot; the last ones of a plane stay zero */
   double *reaction_field[6];            /* the same as arrays, if counts.reaction = 0 */
-  uint32_t *incoming;                   /* [incoming] slot (times counts.reaction) */
+  uint32_t *incoming;                   /* [incoming] slot (its place in doubles, if counts.reaction > 0) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
 } RveArrays;
 
@@ -180,6 +181,10 @@ RVE_ANY int rve_image_fits(const int p[3]) {
   for (int k = 0; k < 3; k++)
     if (p[k] < -RVE_IMAGE_MAX || p[k] > RVE_IMAGE_MAX) return 0;
   return 1;
+}
+/* Doubles from one plane of reactions to the next. */
+RVE_ANY size_t rve_reaction_plane(const RveCounts *n) {
+  return ((size_t)n->slot_rows + 1) * (size_t)n->lanes * (size_t)(n->reaction / (n->dimension - 1));
 }
 RVE_ANY RveHead *rve_head(void *arena) { return (RveHead *)arena; }
 

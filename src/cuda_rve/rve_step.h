@@ -37,13 +37,13 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
 
 /* Rows of all grains, after the list has moved them or at the start. */
 RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCounts *n, const RveArrays *a) {
-  const int blocks = RVE_ROWS ? n->blocks : 0;
-  for (int block = team->pack; block < blocks; block += team->packs) {
-    RveBody b = rve_own_body(ft, a, block * RVE_PACK);
+  const int spans = RVE_ROWS ? n->blocks * RVE_PARTS : 0;
+  for (int span = team->pack; span < spans; span += team->packs) {
+    RveBody b = rve_own_body(ft, a, span * RVE_SPAN);
     if (!ft.tangential)
-      for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], block * RVE_PACK);
+      for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], span * RVE_SPAN);
     if (!ft.viscous) b.m = rve_set(0.0);
-    rve_write_rows(ft.dimension, n, a, block * RVE_PACK, &b);
+    rve_write_rows(ft.dimension, n, a, span * RVE_SPAN, &b);
   }
 }
 

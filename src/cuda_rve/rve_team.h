@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Who computes an RVE, and on how many lanes: the only file that asks which compiler reads it.
  *
- * The kernels are written once over `rve_real`, a pack of RVE_LANES grains. On a CPU it is one vector register and a
- * team is one thread; in CUDA it is one number per thread, a pack is a warp and a team is a thread block. Lists are
- * laid out for packs of RVE_PACK grains.
+ * The kernels are written once over `rve_real`, a span of RVE_SPAN grains. On a CPU it is one vector register and a
+ * team is one thread; in CUDA it is one number per thread, a span is a warp and a team is a thread block. Lists are
+ * laid out for packs of RVE_PACK grains: a span, or RVE_PARTS of them in mixed precision (rve_near.h).
  *
  * CPUs also keep what a neighbour must know of a grain in one row (array of structures): loading rows and transposing
  * them is faster than gathers. CUDA reads the arrays themselves. */
@@ -35,6 +35,13 @@ typedef struct RveTeam {
 #endif
 #endif
 
+/* Where the reaction of a slot stands: what the registers of a transposed pack hold, written as it is. */
+RVE_ANY int rve_place(int pack, int slot) {
+  if (pack == 8) return (slot & ~7) + 2 * (slot & 3) + (slot >> 2 & 1);
+  if (pack == 16) return (slot & ~15) + 4 * (slot & 3) + (slot >> 2 & 3);
+  return slot;
+}
+
 #ifdef RVE_KERNEL /* the rest is for kernels: host code that only stores RVEs has no lanes */
 #if defined(RVE_ISA_AVX512) || defined(RVE_ISA_AVX2)
 #include <immintrin.h>
@@ -49,7 +56,7 @@ typedef struct RveFour {
  * lane */
 #if defined(RVE_ISA_AVX512)
 
-enum { RVE_LANES = 8, RVE_PACK = 8, RVE_ROWS = 1 };
+enum { RVE_SPAN = 8, RVE_ROWS = 1 };
 typedef __m512d rve_real;
 typedef __m512i rve_int; /* int64 */
 typedef __mmask8 rve_mask;
@@ -90,7 +97,7 @@ RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm512_maskz_mov_pd(m,
 
 #elif defined(RVE_ISA_AVX2)
 
-enum { RVE_LANES = 4, RVE_PACK = 4, RVE_ROWS = 1 };
+enum { RVE_SPAN = 4, RVE_ROWS = 1 };
 typedef __m256d rve_real;
 typedef __m256i rve_int;
 typedef __m256d rve_mask; /* all bits of a lane set, or none */
@@ -156,10 +163,10 @@ RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm256_and_pd(m, a); }
 #else /* one lane: plain C, or one CUDA thread */
 
 #if defined(__CUDACC__)
-enum { RVE_LANES = 1, RVE_PACK = 32, RVE_ROWS = 0 };
+enum { RVE_SPAN = 32, RVE_ROWS = 0 };
 #define RVE_LANE ((int)(threadIdx.x & 31u))
 #else
-enum { RVE_LANES = 1, RVE_PACK = 1, RVE_ROWS = 1 };
+enum { RVE_SPAN = 1, RVE_ROWS = 1 };
 #define RVE_LANE 0
 #endif
 typedef double rve_real;
@@ -213,6 +220,13 @@ RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return m ? a : 0.0; }
 
 #endif
 
+#ifdef RVE_MIXED
+enum { RVE_PARTS = 2 };
+#else
+enum { RVE_PARTS = 1 };
+#endif
+enum { RVE_PACK = RVE_PARTS * RVE_SPAN };
+
 /* 1/sqrt(a) to round-off. */
 #if defined(RVE_ISA_AVX512)
 RVE_FN rve_real rve_inverse_sqrt(rve_real a) { /* 14 bits, doubled twice: half the time of a root and a division */
@@ -231,7 +245,7 @@ typedef struct RveQuad {
 } RveQuad;
 
 #if defined(RVE_ISA_AVX512)
-RVE_FN RveQuad rve_transpose(const RveFour row[RVE_PACK]) {
+RVE_FN RveQuad rve_transpose(const RveFour row[RVE_SPAN]) {
   RveQuad q;
   rve_real r[4];
   for (int k = 0; k < 4; k++) r[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(row[k]), row[k + 4], 1);
@@ -245,17 +259,22 @@ RVE_FN RveQuad rve_transpose(const RveFour row[RVE_PACK]) {
   q.f[3] = _mm512_permutex2var_pd(b, second, d);
   return q;
 }
-RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_PACK]) {
+/* row[k]: rows k and k + 4. */
+RVE_FN void rve_transpose_halves(RveQuad q, rve_real row[4]) {
   const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
                 second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   const rve_real a = _mm512_unpacklo_pd(q.f[0], q.f[1]), b = _mm512_unpackhi_pd(q.f[0], q.f[1]);
   const rve_real c = _mm512_unpacklo_pd(q.f[2], q.f[3]), d = _mm512_unpackhi_pd(q.f[2], q.f[3]);
-  const rve_real r[4] = {_mm512_permutex2var_pd(a, first, c), _mm512_permutex2var_pd(b, first, d),
-                         _mm512_permutex2var_pd(a, second, c), _mm512_permutex2var_pd(b, second, d)};
+  row[0] = _mm512_permutex2var_pd(a, first, c), row[1] = _mm512_permutex2var_pd(b, first, d);
+  row[2] = _mm512_permutex2var_pd(a, second, c), row[3] = _mm512_permutex2var_pd(b, second, d);
+}
+RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_SPAN]) {
+  rve_real r[4];
+  rve_transpose_halves(q, r);
   for (int k = 0; k < 4; k++) row[k] = _mm512_castpd512_pd256(r[k]), row[k + 4] = _mm512_extractf64x4_pd(r[k], 1);
 }
 #elif defined(RVE_ISA_AVX2)
-RVE_FN RveQuad rve_transpose(const RveFour row[RVE_PACK]) {
+RVE_FN RveQuad rve_transpose(const RveFour row[RVE_SPAN]) {
   RveQuad q;
   const rve_real a = _mm256_unpacklo_pd(row[0], row[1]), b = _mm256_unpackhi_pd(row[0], row[1]);
   const rve_real c = _mm256_unpacklo_pd(row[2], row[3]), d = _mm256_unpackhi_pd(row[2], row[3]);
@@ -265,7 +284,7 @@ RVE_FN RveQuad rve_transpose(const RveFour row[RVE_PACK]) {
   q.f[3] = _mm256_permute2f128_pd(b, d, 0x31);
   return q;
 }
-RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_PACK]) {
+RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_SPAN]) {
   const RveQuad t = rve_transpose(q.f);
   for (int k = 0; k < 4; k++) row[k] = t.f[k];
 }
@@ -312,9 +331,9 @@ RVE_FN RveQuad rve_gather(const double *rows, const double *const field[4], cons
   for (int k = 0; k < 4; k++) q.f[k] = field[k] ? field[k][at] : 0.0;
   return q;
 #else
-  RveFour row[RVE_PACK];
+  RveFour row[RVE_SPAN];
   (void)field;
-  for (int l = 0; l < RVE_PACK; l++) row[l] = rve_four(rows + offset[lane0 + l]);
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four(rows + offset[lane0 + l]);
   return rve_transpose(row);
 #endif
 }
@@ -327,25 +346,37 @@ RVE_FN void rve_scatter(double *rows, int stride, double *const field[4], int la
   for (int k = 0; k < 4; k++)
     if (field[k]) field[k][lane0 + RVE_LANE] = q.f[k];
 #else
-  RveFour row[RVE_PACK];
+  RveFour row[RVE_SPAN];
   (void)field;
   rve_transpose_back(q, row);
-  for (int l = 0; l < RVE_PACK; l++) rve_four_store(rows + (size_t)(lane0 + l) * (size_t)stride, row[l]);
+  for (int l = 0; l < RVE_SPAN; l++) rve_four_store(rows + (size_t)(lane0 + l) * (size_t)stride, row[l]);
 #endif
 }
 
-/* Reads what rve_scatter wrote. */
-RVE_FN RveQuad rve_read_rows(const double *rows, int stride, const double *const field[4], int lane0) {
+/* Writes four fields of a pack of slots where rve_place says (or into four arrays). */
+RVE_FN void rve_scatter_placed(double *rows, double *const field[4], int lane0, RveQuad q) {
+#if defined(RVE_ISA_AVX512)
+  rve_real row[4];
+  (void)field;
+  rve_transpose_halves(q, row);
+  for (int k = 0; k < 4; k++) rve_store(rows, 4 * lane0 + 8 * k, row[k]);
+#else
+  rve_scatter(rows, 4, field, lane0, q);
+#endif
+}
+
+/* Reads what rve_scatter_placed wrote. */
+RVE_FN RveQuad rve_read_placed(const double *rows, const double *const field[4], int lane0) {
 #if defined(__CUDACC__)
   RveQuad q;
-  (void)rows, (void)stride;
+  (void)rows;
 #pragma unroll
   for (int k = 0; k < 4; k++) q.f[k] = field[k] ? field[k][lane0 + RVE_LANE] : 0.0;
   return q;
 #else
-  RveFour row[RVE_PACK];
+  RveFour row[RVE_SPAN];
   (void)field;
-  for (int l = 0; l < RVE_PACK; l++) row[l] = rve_four(rows + (size_t)(lane0 + l) * (size_t)stride);
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four(rows + (size_t)rve_place(RVE_PACK, lane0 + l) * 4);
   return rve_transpose(row);
 #endif
 }
@@ -364,11 +395,11 @@ RVE_FN RveQuad rve_sum_rows(const double *rows, const double *const field[4], co
   }
   return q;
 #else
-  RveFour row[RVE_PACK];
+  RveFour row[RVE_SPAN];
   (void)field;
-  for (int l = 0; l < RVE_PACK; l++) row[l] = rve_four_zero();
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_zero();
   for (int m = first; m < last; m++)
-    for (int l = 0; l < RVE_PACK; l++) row[l] = rve_four_add(row[l], rve_four(rows + offset[m * RVE_PACK + l]));
+    for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_add(row[l], rve_four(rows + offset[m * RVE_PACK + l]));
   return rve_transpose(row);
 #endif
 }
@@ -392,11 +423,11 @@ RVE_FN double rve_team_reduce(const RveTeam *team, rve_real a, int want_max) {
 #else
 RVE_FN void rve_sync(void) {}
 RVE_FN double rve_team_reduce(const RveTeam *team, rve_real a, int want_max) {
-  double lane[RVE_PACK] __attribute__((aligned(64)));
+  double lane[RVE_SPAN] __attribute__((aligned(64)));
   (void)team;
   rve_store(lane, 0, a);
   double all = lane[0];
-  for (int l = 1; l < RVE_PACK; l++) all = want_max ? (all > lane[l] ? all : lane[l]) : all + lane[l];
+  for (int l = 1; l < RVE_SPAN; l++) all = want_max ? (all > lane[l] ? all : lane[l]) : all + lane[l];
   return all;
 }
 #endif

@@ -9,10 +9,13 @@
 /* Force of the slot's contact on its owner, from the reaction it stored. */
 static void slot_force(const RveRecord *record, int slot, double f[3]) {
   const RveArrays *a = &record->arrays;
+  const int width = record->counts.reaction / (record->counts.dimension - 1); /* doubles, or pairs of FP32 */
+  const double *at = a->reaction + (size_t)rve_place(record->counts.lanes, slot) * (size_t)width;
+  float half[4] = {0};
+  if (width == 2) memcpy(half, at, sizeof half);
   f[2] = 0.0;
   for (int k = 0; k < record->counts.dimension; k++)
-    f[k] = record->counts.reaction ? -a->reaction[(size_t)slot * (size_t)record->counts.reaction + (size_t)k]
-                                   : -a->reaction_field[k][slot];
+    f[k] = width == 0 ? -a->reaction_field[k][slot] : width == 2 ? -(double)half[k] : -at[k];
 }
 
 static int is_contact(const RveSlot *slot) { return slot->overlap > 0.0 || (*slot->image_word & RVE_IMAGE_BOND); }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* One core, one RVE: isochoric biaxial shear of a packing, 2 % in 20,000 steps of 2e-6 s, kn = kt = 1e6 N/m, mu = 0.5.
  *
- *   bench_rve_shear PACKING.txt [2|3] [steps per call] [steps] [skin]
+ *   bench_rve_shear PACKING.txt [2|3] [steps per call] [steps] [skin] [mixed]
  *
  * PACKING.txt: "Lx Ly Lz n", then n lines "x y z r", in metres. 2D grains are spheres in one layer; stresses are then
  * printed as force per length. */
@@ -44,7 +44,7 @@ int main(int argc, char **argv) {
     return 0;
   }
   if (argc < 2 || !read_packing(argv[1], dimension, &packing)) {
-    fprintf(stderr, "usage: bench_rve_shear PACKING.txt [2|3] [steps per call] [steps] [skin]\n");
+    fprintf(stderr, "usage: bench_rve_shear PACKING.txt [2|3] [steps per call] [steps] [skin] [mixed]\n");
     return 2;
   }
   RveScene scene = rve_scene_default();
@@ -57,6 +57,7 @@ int main(int argc, char **argv) {
   scene.local_damping = 0.2;
   scene.time_step = 2e-6;
   scene.threads = 1;
+  scene.mixed = argc > 6 && strcmp(argv[6], "mixed") == 0;
   scene.skin = argc > 5 ? atof(argv[5]) : 0.0;
   RveInput input = {{0.0}, 0.0};
   input.velocity_gradient[0] = -0.5;

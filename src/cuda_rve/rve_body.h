@@ -1,0 +1,326 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* Grains as their neighbours see them, branches, and the reactions that contacts leave for the other grain: how they are
+ * stored, read and summed. Two forms: as FP64, and as pairs of FP32 for mixed precision (rve_near.h), whose rows are half
+ * as long: 2D s_x s_y (v_x v_y) (w r); 3D s_x s_y s_z (r m) | (v_x v_y) (v_z w_x) (w_y w_z) 0. */
+#ifndef DEMPM_RVE_BODY_H
+#define DEMPM_RVE_BODY_H
+
+#include "rve_near.h"
+
+/* A pack of grains. */
+typedef struct RveBody {
+  rve_int s[3];
+  rve_real v[3], w[3], r, m;
+} RveBody;
+
+/* What a contact does to its owner; the neighbour gets -force, and other_torque. */
+typedef struct RvePair {
+  rve_near force[3], torque[3], other_torque[3];
+} RvePair;
+
+RVE_FN int rve_spins(RveFeatures ft) { return ft.dimension == 2 ? 1 : 3; }
+
+RVE_FN rve_real rve_dot(int dim, const rve_real a[3], const rve_real b[3]) {
+  rve_real c = a[0] * b[0] + a[1] * b[1];
+  if (dim == 3) c = c + a[2] * b[2];
+  return c;
+}
+
+RVE_FN RveBody rve_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveBody own;
+  for (int k = 0; k < ft.dimension; k++) {
+    own.s[k] = rve_load_int(a->position[k], lane0);
+    own.v[k] = rve_load(a->velocity[k], lane0);
+  }
+  if (ft.tangential)
+    for (int k = 0; k < rve_spins(ft); k++) own.w[k] = rve_load(a->spin[k], lane0);
+  own.r = rve_load(a->radius, lane0);
+  if (ft.viscous) own.m = rve_load(a->mass, lane0);
+  return own;
+}
+
+/* Fractional branch s_j - s_i + P along cell edge k, in units. */
+RVE_FN rve_int rve_fraction(rve_int si, rve_int sj, rve_int image, int k) {
+  const rve_int top = rve_set_int((int64_t)((uint64_t)15 << 60));
+  const rve_int shift =
+      k == 0 ? rve_int_shift_left(image, 60)
+             : rve_int_and(k == 1 ? rve_int_shift_left(image, 56) : rve_int_shift_left(image, 52), top);
+  return rve_int_add(rve_int_subtract(sj, si), shift);
+}
+
+/* x_j - x_i; h: H times RVE_UNIT. */
+RVE_FN void rve_branch(int dim, const rve_real h[9], const rve_int si[3], const rve_int sj[3], rve_int image,
+                       rve_real d[3]) {
+  rve_real x[3];
+  for (int k = 0; k < dim; k++) x[k] = rve_real_from_int(rve_fraction(si[k], sj[k], image, k));
+  for (int k = 0; k < dim; k++) {
+    d[k] = h[3 * k] * x[0] + h[3 * k + 1] * x[1];
+    if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
+  }
+}
+
+#ifndef RVE_MIXED
+/* ------------------------------------------------------------------------------------------------------------- FP64 */
+
+typedef RveBody RveNearBody;
+#define near_own_body rve_own_body
+#define near_neighbour_body rve_neighbour_body
+#define near_branch rve_branch
+#define near_dot rve_dot
+
+RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveBody other;
+  if (ft.dimension == 2) {
+    const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1], a->velocity[0],
+                                 a->velocity[1]};
+    const double *const f1[4] = {a->spin[0], a->radius, ft.viscous ? a->mass : 0, 0};
+    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0), p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
+    for (int k = 0; k < 2; k++) other.s[k] = rve_int_from_bits(q.f[k]), other.v[k] = q.f[k + 2];
+    other.w[0] = p.f[0], other.r = p.f[1], other.m = p.f[2];
+  } else {
+    const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1],
+                                 (const double *)a->position[2], a->radius};
+    const double *const f1[4] = {a->velocity[0], a->velocity[1], a->velocity[2], ft.viscous ? a->mass : 0};
+    const double *const f2[4] = {a->spin[0], a->spin[1], a->spin[2], 0};
+    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0);
+    for (int k = 0; k < 3; k++) other.s[k] = rve_int_from_bits(q.f[k]);
+    other.r = q.f[3];
+    if (ft.tangential || ft.viscous) {
+      const RveQuad p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
+      for (int k = 0; k < 3; k++) other.v[k] = p.f[k];
+      other.m = p.f[3];
+    }
+    if (ft.tangential) {
+      const RveQuad t = rve_gather(a->row + 8, f2, a->neighbour, lane0);
+      for (int k = 0; k < 3; k++) other.w[k] = t.f[k];
+    }
+  }
+  return other;
+}
+
+/* Writes the rows (or nothing, where arrays are read directly) of the pack at lane0. */
+RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *b) {
+  if (!RVE_ROWS) return;
+  double *const none[4] = {0, 0, 0, 0};
+  double *const rows = a->row;
+  const rve_real zero = rve_set(0.0);
+  if (dimension == 2) {
+    const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), b->v[0], b->v[1]}};
+    const RveQuad p = {{b->w[0], b->r, b->m, zero}};
+    rve_scatter(rows, n->row, none, lane0, q);
+    rve_scatter(rows + 4, n->row, none, lane0, p);
+  } else {
+    const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), rve_bits_from_int(b->s[2]), b->r}};
+    const RveQuad p = {{b->v[0], b->v[1], b->v[2], b->m}}, t = {{b->w[0], b->w[1], b->w[2], zero}};
+    rve_scatter(rows, n->row, none, lane0, q);
+    rve_scatter(rows + 4, n->row, none, lane0, p);
+    rve_scatter(rows + 8, n->row, none, lane0, t);
+  }
+}
+
+RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RvePair *p) {
+  const rve_real zero = rve_set(0.0);
+  double *const *const field = a->reaction_field;
+  if (ft.dimension == 2) {
+    double *const f[4] = {field[0], field[1], ft.tangential ? field[2] : 0, 0};
+    const RveQuad q = {{zero - p->force[0], zero - p->force[1], ft.tangential ? p->other_torque[0] : zero, zero}};
+    rve_scatter_placed(a->reaction, f, lane0, q);
+  } else {
+    double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
+    double *const g[4] = {field[4], field[5], 0, 0};
+    const RveQuad q = {
+        {zero - p->force[0], zero - p->force[1], zero - p->force[2], ft.tangential ? p->other_torque[0] : zero}};
+    rve_scatter_placed(a->reaction, f, lane0, q);
+    if (ft.tangential) {
+      const RveQuad t = {{p->other_torque[1], p->other_torque[2], zero, zero}};
+      rve_scatter_placed(a->reaction + rve_reaction_plane(n), g, lane0, t);
+    }
+  }
+}
+
+/* Force and torque that a pack of grains gets from the slots of others. */
+RVE_FN void rve_sum_reactions(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3],
+                              rve_real torque[3]) {
+  const int block = lane0 / RVE_PACK, first = a->incoming_first[block], last = a->incoming_first[block + 1];
+  double *const *const field = a->reaction_field;
+  const double *const f[4] = {field[0], field[1], field[2], ft.dimension == 3 && ft.tangential ? field[3] : 0};
+  const RveQuad q = rve_sum_rows(a->reaction, f, a->incoming, first, last);
+  force[0] = q.f[0], force[1] = q.f[1];
+  if (ft.dimension == 2) {
+    torque[0] = q.f[2];
+  } else {
+    force[2] = q.f[2], torque[0] = q.f[3];
+    if (ft.tangential) {
+      const double *const g[4] = {field[4], field[5], 0, 0};
+      const RveQuad t = rve_sum_rows(a->reaction + rve_reaction_plane(n), g, a->incoming, first, last);
+      torque[1] = t.f[0], torque[2] = t.f[1];
+    }
+  }
+}
+
+/* Force on the neighbours of the slots at lane0. */
+RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3]) {
+  const double *const field[4] = {a->reaction_field[0], a->reaction_field[1], dim == 3 ? a->reaction_field[2] : 0, 0};
+  const RveQuad q = rve_read_placed(a->reaction, field, lane0);
+  (void)n;
+  for (int k = 0; k < dim; k++) force[k] = q.f[k];
+}
+
+#else
+/* ---------------------------------------------------------------------------------------------------- pairs of FP32 */
+
+typedef struct RveNearBody {
+  near_int s[3];
+  rve_near v[3], w[3], r, m;
+} RveNearBody;
+
+RVE_FN rve_near near_dot(int dim, const rve_near a[3], const rve_near b[3]) {
+  rve_near c = a[0] * b[0] + a[1] * b[1];
+  if (dim == 3) c = c + a[2] * b[2];
+  return c;
+}
+
+RVE_FN RveNearBody near_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveNearBody own;
+  for (int k = 0; k < ft.dimension; k++) {
+    own.s[k] = near_load_int(a->position[k], lane0);
+    own.v[k] = near_load(a->velocity[k], lane0);
+  }
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) own.w[k] = near_load(a->spin[k], lane0);
+  own.r = near_load(a->radius, lane0);
+  if (ft.viscous) own.m = near_load(a->mass, lane0);
+  return own;
+}
+
+/* 2D rows have no room for the mass. */
+RVE_FN rve_real near_neighbour_mass(const RveArrays *a, int lane0) {
+  const __m256i at = _mm256_srli_epi32(_mm256_load_si256((const void *)(a->neighbour + lane0)), 2);
+  return _mm512_i32gather_pd(at, a->mass, 8);
+}
+
+RVE_FN RveNearBody near_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveNearBody other;
+  const RveQuad p = rve_gather(a->row, 0, a->neighbour, lane0), q = rve_gather(a->row, 0, a->neighbour, lane0 + 8);
+  for (int k = 0; k < ft.dimension; k++) {
+    other.s[k].half[0] = rve_int_from_bits(p.f[k]);
+    other.s[k].half[1] = rve_int_from_bits(q.f[k]);
+  }
+  if (ft.dimension == 2) {
+    for (int k = 0; k < 2; k++) other.v[k] = near_unpair(p.f[2], q.f[2], k);
+    other.w[0] = near_unpair(p.f[3], q.f[3], 0);
+    other.r = near_unpair(p.f[3], q.f[3], 1);
+    if (ft.viscous)
+      other.m = near_join(_mm512_cvtpd_ps(near_neighbour_mass(a, lane0)),
+                          _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
+    return other;
+  }
+  other.r = near_unpair(p.f[3], q.f[3], 0);
+  if (ft.viscous) other.m = near_unpair(p.f[3], q.f[3], 1);
+  if (!ft.tangential && !ft.viscous) return other;
+  const RveQuad t = rve_gather(a->row + 4, 0, a->neighbour, lane0),
+                u = rve_gather(a->row + 4, 0, a->neighbour, lane0 + 8);
+  for (int k = 0; k < 3; k++) other.v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
+  for (int k = 0; ft.tangential && k < 3; k++) other.w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
+  return other;
+}
+
+RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveBody other;
+  const RveQuad p = rve_gather(a->row, 0, a->neighbour, lane0);
+  for (int k = 0; k < ft.dimension; k++) other.s[k] = rve_int_from_bits(p.f[k]);
+  if (ft.dimension == 2) {
+    for (int k = 0; k < 2; k++) other.v[k] = near_pair_part(p.f[2], k);
+    other.w[0] = near_pair_part(p.f[3], 0), other.r = near_pair_part(p.f[3], 1);
+    if (ft.viscous) other.m = near_neighbour_mass(a, lane0);
+    return other;
+  }
+  const RveQuad t = rve_gather(a->row + 4, 0, a->neighbour, lane0);
+  other.r = near_pair_part(p.f[3], 0), other.m = near_pair_part(p.f[3], 1);
+  for (int k = 0; k < 3; k++) {
+    other.v[k] = near_pair_part(t.f[k / 2], k % 2);
+    other.w[k] = near_pair_part(t.f[(k + 3) / 2], (k + 3) % 2);
+  }
+  return other;
+}
+
+RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *b) {
+  double *const none[4] = {0, 0, 0, 0};
+  RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), near_pair(b->v[0], b->v[1]),
+                near_pair(b->w[0], b->r)}};
+  (void)n;
+  if (dimension == 2) {
+    rve_scatter(a->row, 4, none, lane0, q);
+    return;
+  }
+  q.f[2] = rve_bits_from_int(b->s[2]);
+  q.f[3] = near_pair(b->r, b->m);
+  const RveQuad t = {{near_pair(b->v[0], b->v[1]), near_pair(b->v[2], b->w[0]), near_pair(b->w[1], b->w[2]), rve_set(0.0)}};
+  rve_scatter(a->row, 8, none, lane0, q);
+  rve_scatter(a->row + 4, 8, none, lane0, t);
+}
+
+RVE_FN void near_branch(int dim, const rve_near h[9], const near_int si[3], const near_int sj[3], near_image image,
+                        rve_near d[3]) {
+  const rve_int low = _mm512_cvtepu16_epi64(_mm256_castsi256_si128(image)),
+                high = _mm512_cvtepu16_epi64(_mm256_extracti128_si256(image, 1));
+  rve_near x[3];
+  for (int k = 0; k < dim; k++)
+    x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(si[k].half[0], sj[k].half[0], low, k)),
+                     _mm512_cvtepi64_ps(rve_fraction(si[k].half[1], sj[k].half[1], high, k)));
+  for (int k = 0; k < dim; k++) {
+    d[k] = h[3 * k] * x[0] + h[3 * k + 1] * x[1];
+    if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
+  }
+}
+
+RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RvePair *p) {
+  const rve_near zero = near_set(0.0);
+  (void)n;
+  if (ft.dimension == 2) {
+    const rve_near q[4] = {zero - p->force[0], zero - p->force[1], ft.tangential ? p->other_torque[0] : zero, zero};
+    near_scatter_placed(a->reaction, lane0, q);
+    return;
+  }
+  const rve_near q[4] = {zero - p->force[0], zero - p->force[1], zero - p->force[2],
+                         ft.tangential ? p->other_torque[0] : zero};
+  near_scatter_placed(a->reaction, lane0, q);
+  if (!ft.tangential) return;
+  const rve_near t[4] = {p->other_torque[1], p->other_torque[2], zero, zero};
+  near_scatter_placed(a->reaction + rve_reaction_plane(n), lane0, t);
+}
+
+/* Per lane: the sum of the reactions that come in, four FP32 fields at `rows`. */
+RVE_FN RveQuad near_sum_rows(const double *rows, const RveArrays *a, int lane0) {
+  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK;
+  RveFour row[RVE_SPAN];
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_zero();
+  for (int m = a->incoming_first[block]; m < a->incoming_first[block + 1]; m++)
+    for (int l = 0; l < RVE_SPAN; l++)
+      row[l] = rve_four_add(row[l], near_four(rows + a->incoming[m * RVE_PACK + part + l]));
+  return rve_transpose(row);
+}
+
+RVE_FN void rve_sum_reactions(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3],
+                              rve_real torque[3]) {
+  const RveQuad q = near_sum_rows(a->reaction, a, lane0);
+  force[0] = q.f[0], force[1] = q.f[1];
+  if (ft.dimension == 2) {
+    torque[0] = q.f[2];
+    return;
+  }
+  force[2] = q.f[2], torque[0] = q.f[3];
+  if (!ft.tangential) return;
+  const RveQuad t = near_sum_rows(a->reaction + rve_reaction_plane(n), a, lane0);
+  torque[1] = t.f[0], torque[2] = t.f[1];
+}
+
+RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3]) {
+  RveFour row[RVE_SPAN];
+  (void)n;
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = near_four(a->reaction + (size_t)rve_place(RVE_PACK, lane0 + l) * 2);
+  const RveQuad q = rve_transpose(row);
+  for (int k = 0; k < dim; k++) force[k] = q.f[k];
+}
+
+#endif
+#endif
