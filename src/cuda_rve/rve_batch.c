@@ -89,7 +89,8 @@ static BaseStatus step_record(RveBatch *batch, int rve, const RveInput *input, d
     record->last.status = BASE_ERROR_UNSTABLE;
     return BASE_OK;
   }
-  if (batch->keep) TRY(rve_keep_before(record, workspace));
+  workspace->kept = batch->keep && rve_may_fail(batch, record, &call);
+  if (workspace->kept) TRY(rve_keep_before(record, workspace));
   if (call.steps > 0) TRY(run_record(batch, record, &call, workspace));
   measure_record(batch, record, &call, work_before, duration);
   return rve_head(record->arena)->failed ? rve_note_failure(batch, rve, &call, input, duration, workspace) : BASE_OK;

@@ -9,8 +9,9 @@
 typedef struct RveWorkspace { /* one thread's */
   void *memory;
   size_t bytes;
-  RveRecord before; /* the RVE as it was before the call; its arena has room for `room` bytes */
+  RveRecord before; /* the RVE as it was before the call, if kept = 1; its arena has room for `room` bytes */
   size_t room;
+  int kept;
 } RveWorkspace;
 
 /* All about a failed RVE. */
@@ -38,6 +39,8 @@ struct RveBatch {
   char name[16];
 };
 
+/* 1 if the record's state is worth a copy before this call. */
+int rve_may_fail(const RveBatch *batch, const RveRecord *record, const RveCall *call);
 /* Copies the record's state into the thread's memory. */
 BaseStatus rve_keep_before(const RveRecord *record, RveWorkspace *workspace);
 /* Finds out why the record failed in this call and remembers it, with the kept state if workspace is not NULL. */

@@ -132,7 +132,8 @@ static BaseStatus find_script(size_t room, char *name) {
 
 static BaseStatus plot(const char *answer, const char *picture) {
   char script[2048];
-  const char *python = getenv("PYTHON") && *getenv("PYTHON") ? getenv("PYTHON") : "python3";
+  const char *wanted = getenv("PYTHON"), *debian = "/usr/bin/python3"; /* another one in PATH may lack matplotlib */
+  const char *python = wanted && *wanted ? wanted : access(debian, X_OK) == 0 ? debian : "python3";
   TRY(find_script(sizeof script, script));
   char *const words[] = {(char *)python, script, (char *)answer, (char *)"--out", (char *)picture, NULL};
   pid_t child;
@@ -221,10 +222,10 @@ static BaseStatus run(const Arguments *a) {
   BaseStatus status;
   TRY(element_settings_read(a->sets, a->set, element_path_is_builtin(a->path) ? a->path : NULL, &settings));
   TRY(rve_packing_read_history(a->file, dimension, settings.scene.tangential_stiffness, &packing));
+  const int copies = isnan(a->copies) ? 1 : (int)a->copies;
+  if (copies == 1) settings.scene.threads = 1; /* a packing runs on one thread: others would only wait for it */
   TRY_GOTO(check_time_step(&settings, &packing), status, done);
-  TRY_GOTO(rve_batch_create(&settings.scene, &packing, 1, NULL, isnan(a->copies) ? 1 : (int)a->copies, settings.backend,
-                            &batch),
-           status, done);
+  TRY_GOTO(rve_batch_create(&settings.scene, &packing, 1, NULL, copies, settings.backend, &batch), status, done);
   status = run_batch(a, &settings, &packing, batch);
 done:
   rve_batch_destroy(batch);

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* A packing through a loading path. Velocity gradients are passed on; stresses are held by a proportional and integral
  * servo. Its plant is the packing: d sigma/dt = C D, C unknown but bounded by the affine modulus M that every answer
- * reports, so the gains follow from M and a time tau: D = I - e / (M tau), dI/dt = -e / (M 10 tau tau), e = sigma -
- * wanted. tau is the time of a compression wave through the cell, at least two calls. A packing that has become much
- * softer than M (g = C/M) is damped by sqrt(10 g)/2: 0.5 at g = 0.1. */
+ * reports, so the gains follow from M and a time tau: D = I - e / (M tau), dI/dt = -e / (M 4 tau tau), e = sigma -
+ * wanted. tau is a quarter of the time of a compression wave through the cell, at least two calls. A packing that has
+ * become softer than M (g = C/M) is damped by sqrt(g): 0.3 at g = 0.1. Measured on biaxial tests of 400 disks at an
+ * inertial number of 6e-4, dense and loose, local damping 0 to 0.7: running mean of the stress within 2 %; with the whole
+ * wave time 7 %, with an eighth 1 %, but there two calls are longer. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +13,8 @@
 #include "rve_element.h"
 #include "rve_replay.h"
 
-static const double integral_time = 10.0, approach_share = 0.25; /* of tau; of the tolerance */
+static const double wave_share = 0.25, integral_time = 4.0; /* tau over the wave's time; over tau */
+static const double approach_share = 0.25;                  /* of the tolerance */
 
 typedef struct Servo {
   int active[6];
@@ -110,11 +113,11 @@ static int is_controlled(const Servo *servo) {
   return any;
 }
 
-static double wave_time(const Driver *d, double modulus) {
+static double reaction_time(const Driver *d, double modulus, double duration) {
   const RveAnswer *answer = &d->answer[0];
   const double depth = d->scene->dimension == 2 ? d->scene->thickness : 1.0;
   const double edge = pow(answer->volume / depth, 1.0 / d->scene->dimension);
-  return edge * sqrt(d->scene->density * answer->solid_fraction / modulus);
+  return fmax(wave_share * edge * sqrt(d->scene->density * answer->solid_fraction / modulus), 2.0 * duration);
 }
 
 /* What an isotropic packing with the affine moduli C11 = M, C12 = C44 = M/3 would need so that the wanted stresses keep
@@ -142,7 +145,7 @@ static void ask(Driver *d, double duration, double rate[9]) {
   const RveAnswer *answer = &d->answer[0];
   const double modulus = fmax(answer->modulus, servo->scale); /* without contacts: closes at the fastest rate */
   if (!(modulus > 0.0)) return;
-  const double tau = fmax(wave_time(d, modulus), 2.0 * duration);
+  const double tau = reaction_time(d, modulus, duration);
   double feed[6];
   foresee(d, rate, modulus, feed);
   for (int k = 0; k < 6; k++) {
@@ -211,12 +214,12 @@ static BaseStatus not_followed(const Driver *d, int k, const char *phase) {
                     servo->last[k], servo->fastest);
 }
 
-/* Single grains that jump must not end a test: the mean over ten tau counts. */
+/* An avalanche of grains must not end a test: the mean over 40 tau counts. */
 static BaseStatus watch_stress(Driver *d, double duration) {
   Servo *servo = &d->servo;
   const double modulus = fmax(d->answer[0].modulus, servo->scale);
   if (!(modulus > 0.0)) return BASE_OK;
-  const double tau = fmax(wave_time(d, modulus), 2.0 * duration), weight = 1.0 - exp(-duration / (10.0 * tau));
+  const double tau = reaction_time(d, modulus, duration), weight = 1.0 - exp(-duration / (40.0 * tau));
   int which;
   for (int k = 0; k < 6; k++)
     if (servo->active[k])

@@ -52,7 +52,7 @@ ElementSettings element_settings_default(int dimension) {
   settings.pressure = settings.start = settings.duration = settings.rate = settings.strain = NAN;
   settings.servo_rate = NAN;
   settings.servo_steps = 10;
-  settings.stress_tolerance = 0.02;
+  settings.stress_tolerance = 0.03;
   settings.most_steps = 2e6;
   return settings;
 }

@@ -38,7 +38,7 @@ BaseStatus rve_batch_write_replay(const RveBatch *batch, int rve, const char *na
   const RveFailed *failed = batch->failed[rve];
   if (!failed || !failed->state)
     return base_error(BASE_ERROR_ARGUMENT, "RVE %d: no state was kept from before the failure%s", rve,
-                      batch->device ? " (the CPU backend keeps it)" : "");
+                      batch->device ? " (the CPU backend keeps it)" : batch->keep ? ": the packing was calm" : "");
   memset(&header, 0, sizeof header);
   memcpy(header.magic, magic, sizeof magic);
   header.version = REPLAY_VERSION;

@@ -23,13 +23,14 @@ typedef struct RveFailure {
 BaseStatus rve_batch_failure(const RveBatch *batch, int rve, RveFailure *failure);
 
 /* keep = 1: from now on a failed RVE keeps the state it had before the call, so that a replay can be written. Costs one
- * copy of the state per RVE and call, into memory of the thread, and nothing else until an RVE fails. Off at first. CPU
- * only: on a device no states are kept. */
+ * copy of the state per RVE and call, into memory of the thread, and nothing else until an RVE fails. Calls of fewer than
+ * 100 DEM steps are copied only when the packing moves or strains visibly. Off at first. CPU only: on a device no states
+ * are kept. */
 void rve_batch_keep_states(RveBatch *batch, int keep);
 
 /* Writes state before the failing call, input, duration, scene and failure of a failed RVE. name (may be NULL): what
  * the RVE is called outside, at most RVE_NAME_BYTES - 1 bytes are kept. BASE_ERROR_ARGUMENT if the RVE has not failed or
- * its state was not kept; BASE_ERROR_FILE. */
+ * its state was not kept (too calm before the call); BASE_ERROR_FILE. */
 BaseStatus rve_batch_write_replay(const RveBatch *batch, int rve, const char *name, const char *file);
 
 typedef struct RveReplay {
