@@ -44,15 +44,21 @@ class Answer:
     def __getitem__(self, name):
         return self.table[name]
 
-    def strain(self):
-        """(values, name) of what was strained most: -ln F_ii or F_ij; None if the test is isotropic."""
-        strains = {f"axial strain $-\\ln F_{{{a}{a}}}$": -np.log(self[f"F{a}{a}"]) for a in self.axes}
-        spread = [values[-1] for values in strains.values()]
-        shear = {f"shear $F_{{{a}{b}}}$": self[f"F{a}{b}"] for a in self.axes for b in self.axes if a != b}
-        name, values = max({**strains, **shear}.items(), key=lambda item: np.ptp(item[1]))
-        if name in strains and np.ptp(spread) < 0.2 * abs(values[-1]):
-            return None
-        return values, name
+    def strains(self):
+        """{name: values} of compressions -ln F_ii and shears F_ij."""
+        pairs = [(a, b) for a in self.axes for b in self.axes if a != b]
+        found = {f"compression $-\\ln F_{{{a}{a}}}$": -np.log(self[f"F{a}{a}"]) for a in self.axes}
+        found.update({f"shear $F_{{{a}{b}}}$": self[f"F{a}{b}"] for a, b in pairs})
+        return found
+
+    def main_strain(self):
+        """Name of the strain over which the test is drawn: what is compressed or sheared most; None if isotropic."""
+        strains = self.strains()
+        ends = [values[-1] for name, values in strains.items() if name.startswith("compression")]
+        reach = {name: np.ptp(values) if name.startswith("shear") else max(values.max(), 0.3 * np.ptp(values))
+                 for name, values in strains.items()}
+        name = max(reach, key=reach.get)
+        return None if name.startswith("compression") and np.ptp(ends) < 0.2 * abs(strains[name][-1]) else name
 
     def mean_pressure(self):
         return -sum(self[f"s{a}{a}"] for a in self.axes) / len(self.axes)
@@ -73,10 +79,10 @@ class Answer:
 
 def draw(answers, path):
     figure, grid = plt.subplots(2, 2, figsize=(8.0, 5.4))
-    strained = [answer.strain() for answer in answers]
-    isotropic = any(pair is None for pair in strained)
-    for answer, pair in zip(answers, strained):
-        x = answer.mean_pressure() / 1e3 if isotropic else pair[0] * 100.0
+    name = answers[0].main_strain()
+    isotropic = name is None
+    for answer in answers:
+        x = answer.mean_pressure() / 1e3 if isotropic else answer.strains()[name] * 100.0
         first = answer["time"] * 1e3 if isotropic else x
         y = answer.mean_pressure() / 1e3 if isotropic else answer.strength()
         grid[0][0].plot(first, y, label=answer.label)
@@ -86,7 +92,7 @@ def draw(answers, path):
         grid[1][1].plot(x, work / answer["volume"][0] / 1e3)
         grid[1][1].plot(x, answer["elastic_energy"] / answer["volume"][0] / 1e3, ls=":",
                         color=grid[1][1].lines[-1].get_color())
-    across = "mean pressure [kPa]" if isotropic else f"{strained[0][1]} [%]"
+    across = "mean pressure [kPa]" if isotropic else f"{name} [%]"
     for axes in grid.flat:
         axes.set_xlabel(across)
         axes.set_xscale("log" if isotropic else "linear")
@@ -100,8 +106,7 @@ def draw(answers, path):
     grid[1][0].set_ylabel("coordination number [-]")
     grid[1][1].set_ylabel("energy [kJ/m$^3$]")
     grid[1][1].set_title("lost (solid), elastic (dotted)", loc="left")
-    if len(answers) > 1 or answers[0].label:
-        grid[0][0].legend(frameon=False)
+    grid[0][0].legend(frameon=False)
     figure.savefig(path, dpi=130)
 
 
