@@ -205,7 +205,9 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   TRY_GOTO(refresh(batch, count, NULL), status, failed);
   for (int k = 0; k < count; k++)
     if (rve_head(batch->record[k].arena)->failed) {
-      status = base_error(BASE_ERROR_ARGUMENT, "RVE %d: the cell is too narrow for its grains", k);
+      const RveCall still = {.steps = 0};
+      TRY_GOTO(rve_note_failure(batch, k, &still, &nothing, 0.0, NULL), status, failed);
+      status = base_error(BASE_ERROR_ARGUMENT, "RVE %d: %s", k, batch->failed[k]->failure.cause);
       goto failed;
     }
   *result = batch;

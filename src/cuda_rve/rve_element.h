@@ -69,13 +69,17 @@ typedef struct ElementState {
   double heat; /* W/m3, mean since the last line */
   RveAnswer answer;
   double friction_work, damping_work; /* J since time 0 */
+  double overlap;                     /* deepest one, over the smaller radius */
 } ElementState;
+/* Deepest overlap of RVE 0, over the smaller radius. */
+BaseStatus element_overlap(const RveBatch *batch, double *overlap);
 void element_table_head(FILE *out, int dimension, int thermal);
 void element_table_line(FILE *out, int dimension, int thermal, const ElementState *state);
 
 typedef struct ElementFigures { /* of a whole run */
   double seconds;               /* wall time in the engine */
   double particle_steps;
+  double worst_overlap; /* of all lines */
   double worst_stress;  /* largest deviation of the running mean from what was asked for, over the largest stress */
   double approach_time; /* s, of the approach */
   int64_t approach_steps;

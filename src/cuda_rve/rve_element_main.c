@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "../base/tensor.h"
 #include "rve_element.h"
 #include "rve_packing.h"
 #include "rve_replay.h"
@@ -172,6 +173,8 @@ static void report(const Arguments *a, const RvePacking *packing, const RveBatch
     printf("\n");
   }
   printf("stress control   worst deviation %.3g of the largest stress asked for\n", f->worst_stress);
+  printf("overlap          at most %.3g of the smaller radius%s\n", f->worst_overlap,
+         f->worst_overlap > 0.3 ? ": more than linear contacts are meant for (0.3)" : "");
   printf("answer           %s: %d lines\n", a->out, f->lines);
   printf("backend          %s, %d %s\n", rve_batch_backend_name(batch), rve_batch_count(batch),
          rve_batch_count(batch) == 1 ? "copy" : "copies");
@@ -240,16 +243,18 @@ static void print_failure(const char *when, const RveFailure *failure) {
          (long long)failure->call_step, (long long)failure->call_steps, failure->cause);
 }
 
-static void replay_line(FILE *out, const RveReplay *replay, const RveAnswer *answer, const double gradient[9],
-                        double time, double temperature) {
+static BaseStatus replay_line(FILE *out, const RveReplay *replay, const RveBatch *batch, const RveAnswer *answer,
+                              const double gradient[9], double time) {
   ElementState state = {.time = time,
-                        .temperature = temperature,
+                        .temperature = replay->input.temperature,
                         .heat = answer->heat,
                         .answer = *answer,
                         .friction_work = answer->friction_work,
                         .damping_work = answer->damping_work};
   memcpy(state.gradient, gradient, sizeof state.gradient);
+  TRY(element_overlap(batch, &state.overlap));
   element_table_line(out, replay->scene.dimension, replay->scene.thermal, &state);
+  return BASE_OK;
 }
 
 /* The same call in calls of one DEM step each, to see what grows. */
@@ -258,14 +263,15 @@ static BaseStatus replay_slowly(const RveReplay *replay, RveBatch *batch, int64_
   RveInput input = replay->input;
   RveAnswer answer;
   BaseStatus status = BASE_OK;
-  double gradient[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  double gradient[9];
   const double duration = replay->duration / (double)steps;
   if (every == 0) every = steps > 1000 ? steps / 1000 : 1;
   element_table_head(out, replay->scene.dimension, replay->scene.thermal);
   for (int64_t k = 1; k <= steps && status == BASE_OK; k++) {
     status = rve_batch_step(batch, 1, NULL, &input, duration, &answer);
+    tensor_exponential(input.velocity_gradient, duration * (double)k, gradient);
     if (k % every && status == BASE_OK) continue;
-    replay_line(out, replay, &answer, gradient, duration * (double)k, input.temperature);
+    TRY(replay_line(out, replay, batch, &answer, gradient, duration * (double)k));
   }
   if (status != BASE_ERROR_UNSTABLE) return status;
   TRY(rve_batch_failure(batch, 0, failure));

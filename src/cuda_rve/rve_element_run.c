@@ -89,7 +89,7 @@ static BaseStatus call(Driver *d, const double rate[9], double temperature, doub
   return compare_copies(d);
 }
 
-static void write_line(Driver *d) {
+static BaseStatus write_line(Driver *d) {
   const RveAnswer *answer = &d->answer[0];
   const double span = d->time - d->time_last;
   ElementState state = {.time = d->time,
@@ -101,8 +101,11 @@ static void write_line(Driver *d) {
   if (span > 0.0) state.heat = (answer->friction_work - d->friction_last) / (answer->volume * span);
   d->friction_last = answer->friction_work;
   d->time_last = d->time;
+  TRY(element_overlap(d->batch, &state.overlap));
+  d->figures->worst_overlap = fmax(d->figures->worst_overlap, state.overlap);
   element_table_line(d->run->out, d->scene->dimension, d->scene->thermal, &state);
   d->figures->lines++;
+  return BASE_OK;
 }
 
 /* ----------------------------------------------------------------------------------------------------------- servo */
@@ -294,12 +297,9 @@ static BaseStatus run_row(Driver *d, const ElementRow *row, const ElementRow *ne
     if (d->servo.active[k] && !isnan(next->stress[k])) d->servo.slope[k] = (next->stress[k] - row->stress[k]) / span;
   for (int64_t p = 0; p < pieces; p++) {
     const double end = p + 1 == pieces ? next->time : row->time + span * (double)(p + 1) / (double)pieces;
-    const BaseStatus status = advance(d, row, next, end);
-    if (status != BASE_OK) {
-      write_line(d);
-      return status;
-    }
-    write_line(d);
+    const BaseStatus status = advance(d, row, next, end), written = write_line(d);
+    TRY(status);
+    TRY(written);
   }
   return BASE_OK;
 }
@@ -316,7 +316,7 @@ static BaseStatus run_path(Driver *d) {
   if (d->scene->thermal && !isnan(path->row[0].temperature) && path->row[0].temperature != d->temperature)
     TRY(call(d, still, path->row[0].temperature, d->time_step));
   element_table_head(d->run->out, d->scene->dimension, d->scene->thermal);
-  write_line(d);
+  TRY(write_line(d));
   const double whole = path->row[path->rows - 1].time;
   const int by_steps = d->run->every > 0 && d->scene->substeps == 0;
   const double line = by_steps ? (double)d->run->every * d->time_step : whole / 200.0;

@@ -1,6 +1,22 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The answer of dempm-rve: CSV, one line per state. */
+#include <math.h>
+
 #include "rve_element.h"
+
+BaseStatus element_overlap(const RveBatch *batch, double *overlap) {
+  RveView view;
+  *overlap = 0.0;
+  TRY(rve_batch_view(batch, 0, &view));
+  for (int c = 0; c < view.contacts; c++) {
+    const double *b = view.branch + 3 * (size_t)c;
+    const double ri = view.radius[view.pair[2 * c]], rj = view.radius[view.pair[2 * c + 1]];
+    const double depth = ri + rj - sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
+    *overlap = fmax(*overlap, depth / fmin(ri, rj));
+  }
+  rve_view_destroy(&view);
+  return BASE_OK;
+}
 
 static void head_symmetric(FILE *out, int dimension, const char *name) {
   for (int k = 0; k < 6; k++)
@@ -24,7 +40,7 @@ void element_table_head(FILE *out, int dimension, int thermal) {
   }
   fprintf(out, ",heat,void_ratio,solid_fraction,coordination");
   head_symmetric(out, dimension, "fabric_");
-  fprintf(out, ",bond_fraction,kinetic_energy,elastic_energy,friction_work,damping_work,unbalanced,volume,steps,status\n");
+  fprintf(out, ",bond_fraction,overlap,kinetic_energy,elastic_energy,friction_work,damping_work,unbalanced,volume,steps,status\n");
 }
 
 void element_table_line(FILE *out, int dimension, int thermal, const ElementState *state) {
@@ -39,6 +55,6 @@ void element_table_line(FILE *out, int dimension, int thermal, const ElementStat
   }
   fprintf(out, ",%.9g,%.12g,%.12g,%.9g", state->heat, 1.0 / a->solid_fraction - 1.0, a->solid_fraction, a->coordination);
   line_symmetric(out, dimension, a->fabric);
-  fprintf(out, ",%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.12g,%lld,%d\n", a->bond_fraction, a->kinetic_energy, a->elastic_energy,
-          state->friction_work, state->damping_work, a->unbalanced, a->volume, (long long)a->steps, a->status);
+  fprintf(out, ",%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.6g,%.12g,%lld,%d\n", a->bond_fraction, state->overlap,
+          a->kinetic_energy, a->elastic_energy, state->friction_work, state->damping_work, a->unbalanced, a->volume, (long long)a->steps, a->status);
 }

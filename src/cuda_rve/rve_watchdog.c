@@ -102,7 +102,7 @@ static void describe_cell(const RveRecord *record, size_t room, char *text) {
            2.0 * head->radius_max * head->scale);
 }
 
-static void describe(const RveRecord *record, const RveCall *call, int measured, size_t room, char *text) {
+static void describe(const RveRecord *record, const RveCall *call, size_t room, char *text) {
   const RveHead *head = rve_head((void *)record->arena);
   const Fastest fastest = find_fastest(record);
   const double smallest = head->radius_min * head->scale;
@@ -116,7 +116,7 @@ static void describe(const RveRecord *record, const RveCall *call, int measured,
     snprintf(text, room,
              "grain %d moves %.3g m in one DEM step of %.3g s; at most half the smallest radius, %.3g m, is allowed",
              fastest.grain + 1, fastest.speed * call->dt, call->dt, 0.5 * smallest);
-  else if (measured) {
+  else if (head->list_due == RVE_LIST_GOOD) { /* the steps went well, the answer did not */
     snprintf(text, room, "the stress, an energy or another answer is not finite");
     return;
   } else describe_cell(record, room, text);
@@ -147,7 +147,7 @@ BaseStatus rve_note_failure(RveBatch *batch, int rve, const RveCall *call, const
   failure->step = head->steps;
   failure->call_steps = call->steps;
   failure->call_step = head->done > 0 ? head->done : call->steps; /* done is 0 again after the last step */
-  describe(record, call, head->done == 0, sizeof failure->cause, failure->cause);
+  describe(record, call, sizeof failure->cause, failure->cause);
   if (!workspace || !workspace->kept) return BASE_OK;
   TRY(base_alloc(rve_record_state_bytes(&workspace->before), 1, &failed->state));
   return rve_record_pack(&workspace->before, rve_scene_hash(&batch->scene), failed->state, &failed->bytes);
