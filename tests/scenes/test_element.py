@@ -332,10 +332,10 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("words, message", WRONG)
+@pytest.mark.parametrize("words, message", WRONG, ids=[f"{k}" for k in range(len(WRONG))])
 def test_wrong_calls_are_refused(rve, words, message):
     code, output = rve(words, check=False)
-    assert code == 1 and "dempm-rve: ERROR: " in output and message in output, output
+    assert code == 1 and "dempm-rve: ERROR: " in output and message in output, f"{words}\n{output}"
 
 
 @pytest.mark.parametrize("text, message", [
@@ -354,7 +354,8 @@ def test_wrong_calls_are_refused(rve, words, message):
     ("time,Lxx\n0,fast\n1,0\n", "line 2, column Lxx: found 'fast'"),
     ("time,Lxx,sxx\n0,0,-1e5\n1,0,\n", "line 2: sxx and Lxx are both given"),
     ("time,Lyx,sxy\n0,,0\n1,0,0\n", "line 3: sxy and Lyx are both given"),
-])
+], ids=["empty", "one_row", "time_second", "z", "stress_z", "unknown", "cold", "twice", "fields", "time_stands", "late", "nan",
+        "word", "both", "both_shear"])
 def test_wrong_path_files_are_refused(rve, text, message):
     (rve.path / "path.csv").write_text(text)
     code, output = rve(f"run hex.data --path path.csv {DISKS} --out out.csv", check=False)
@@ -373,7 +374,7 @@ GRID = [(0.0198 * (k % 5), 0.0198 * (k // 5)) for k in range(25)]
      "ITEM: ATOMS id x y z radius\n1 0.5 0.5 0.5 0.1\n", "periodic"),
     ("Once upon a time\nthere was a packing.\n", "packing file bad"),
     ("", "packing file bad"),
-])
+], ids=["deep", "nan", "flat", "wide", "walls", "prose", "empty"])
 def test_bad_packings_are_refused(rve, content, message):
     (rve.path / "bad").write_text(content)
     code, output = rve(f"run bad {OK}", check=False)
