@@ -71,7 +71,7 @@ typedef struct ElementState {
   double friction_work, damping_work; /* J since time 0 */
   double overlap;                     /* deepest one, over the smaller radius */
 } ElementState;
-/* Deepest overlap of RVE 0, over the smaller radius. */
+/* Deepest overlap of RVE 0, over the smaller radius; unchanged if it has failed: its grains may be anywhere then. */
 BaseStatus element_overlap(const RveBatch *batch, double *overlap);
 void element_table_head(FILE *out, int dimension, int thermal);
 void element_table_line(FILE *out, int dimension, int thermal, const ElementState *state);

@@ -244,7 +244,7 @@ static void print_failure(const char *when, const RveFailure *failure) {
 }
 
 static BaseStatus replay_line(FILE *out, const RveReplay *replay, const RveBatch *batch, const RveAnswer *answer,
-                              const double gradient[9], double time) {
+                              const double gradient[9], double time, double *overlap) {
   ElementState state = {.time = time,
                         .temperature = replay->input.temperature,
                         .heat = answer->heat,
@@ -252,7 +252,8 @@ static BaseStatus replay_line(FILE *out, const RveReplay *replay, const RveBatch
                         .friction_work = answer->friction_work,
                         .damping_work = answer->damping_work};
   memcpy(state.gradient, gradient, sizeof state.gradient);
-  TRY(element_overlap(batch, &state.overlap));
+  TRY(element_overlap(batch, overlap));
+  state.overlap = *overlap;
   element_table_line(out, replay->scene.dimension, replay->scene.thermal, &state);
   return BASE_OK;
 }
@@ -263,7 +264,7 @@ static BaseStatus replay_slowly(const RveReplay *replay, RveBatch *batch, int64_
   RveInput input = replay->input;
   RveAnswer answer;
   BaseStatus status = BASE_OK;
-  double gradient[9];
+  double gradient[9], overlap = 0.0;
   const double duration = replay->duration / (double)steps;
   if (every == 0) every = steps > 1000 ? steps / 1000 : 1;
   element_table_head(out, replay->scene.dimension, replay->scene.thermal);
@@ -271,7 +272,7 @@ static BaseStatus replay_slowly(const RveReplay *replay, RveBatch *batch, int64_
     status = rve_batch_step(batch, 1, NULL, &input, duration, &answer);
     tensor_exponential(input.velocity_gradient, duration * (double)k, gradient);
     if (k % every && status == BASE_OK) continue;
-    TRY(replay_line(out, replay, batch, &answer, gradient, duration * (double)k));
+    TRY(replay_line(out, replay, batch, &answer, gradient, duration * (double)k, &overlap));
   }
   if (status != BASE_ERROR_UNSTABLE) return status;
   TRY(rve_batch_failure(batch, 0, failure));

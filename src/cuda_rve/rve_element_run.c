@@ -41,6 +41,7 @@ typedef struct Driver {
   double friction, damping; /* J at time 0 */
   double friction_last;     /* J at the last line */
   double time, time_last;
+  double overlap; /* of the last line */
   double temperature;
   Servo servo;
 } Driver;
@@ -101,8 +102,9 @@ static BaseStatus write_line(Driver *d) {
   if (span > 0.0) state.heat = (answer->friction_work - d->friction_last) / (answer->volume * span);
   d->friction_last = answer->friction_work;
   d->time_last = d->time;
-  TRY(element_overlap(d->batch, &state.overlap));
-  d->figures->worst_overlap = fmax(d->figures->worst_overlap, state.overlap);
+  TRY(element_overlap(d->batch, &d->overlap));
+  state.overlap = d->overlap;
+  d->figures->worst_overlap = fmax(d->figures->worst_overlap, d->overlap);
   element_table_line(d->run->out, d->scene->dimension, d->scene->thermal, &state);
   d->figures->lines++;
   return BASE_OK;
@@ -288,6 +290,14 @@ static BaseStatus advance(Driver *d, const ElementRow *row, const ElementRow *ne
   return BASE_OK;
 }
 
+/* The last line of a run that failed, without touching its message. */
+static BaseStatus end_early(Driver *d, BaseStatus status) {
+  char text[1024];
+  snprintf(text, sizeof text, "%s", base_error_message());
+  (void)write_line(d);
+  return base_error(status, "%s", text);
+}
+
 static BaseStatus run_row(Driver *d, const ElementRow *row, const ElementRow *next, double line) {
   const double span = next->time - row->time;
   const int64_t pieces = (int64_t)fmax(1.0, rint(span / line));
@@ -297,9 +307,9 @@ static BaseStatus run_row(Driver *d, const ElementRow *row, const ElementRow *ne
     if (d->servo.active[k] && !isnan(next->stress[k])) d->servo.slope[k] = (next->stress[k] - row->stress[k]) / span;
   for (int64_t p = 0; p < pieces; p++) {
     const double end = p + 1 == pieces ? next->time : row->time + span * (double)(p + 1) / (double)pieces;
-    const BaseStatus status = advance(d, row, next, end), written = write_line(d);
-    TRY(status);
-    TRY(written);
+    const BaseStatus status = advance(d, row, next, end);
+    if (status == BASE_OK) TRY(write_line(d));
+    else return end_early(d, status);
   }
   return BASE_OK;
 }

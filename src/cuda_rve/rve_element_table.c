@@ -3,9 +3,12 @@
 #include <math.h>
 
 #include "rve_element.h"
+#include "rve_replay.h"
 
 BaseStatus element_overlap(const RveBatch *batch, double *overlap) {
   RveView view;
+  RveFailure failure;
+  if (rve_batch_failure(batch, 0, &failure) == BASE_OK) return BASE_OK;
   *overlap = 0.0;
   TRY(rve_batch_view(batch, 0, &view));
   for (int c = 0; c < view.contacts; c++) {
