@@ -64,7 +64,8 @@ LIBRARY := $(BUILD)/libdempm.a
 C_OBJECTS := $(C_SOURCES:src/%.c=$(BUILD)/%.o) $(KERNEL_OBJECTS) $(CU_SOURCES:src/%.cu=$(BUILD)/%.cu.o)
 MPI_OBJECTS := $(MPI_SOURCES:src/%.c=$(BUILD)/%.o) $(CXX_SOURCES:src/%.cpp=$(BUILD)/%.o)
 PROGRAMS := $(if $(wildcard src/fix_mpm_couple/main.cpp),$(BUILD)/dempm) \
-            $(if $(wildcard src/cuda_rve/rve_pack_main.c),$(BUILD)/dempm-pack)
+            $(if $(wildcard src/cuda_rve/rve_pack_main.c),$(BUILD)/dempm-pack) \
+            $(if $(wildcard src/cuda_rve/rve_element_main.c),$(BUILD)/dempm-rve)
 TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c)) \
          $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
@@ -104,6 +105,8 @@ $(LIBRARY): $(C_OBJECTS) $(MPI_OBJECTS)
 $(BUILD)/dempm: $(BUILD)/fix_mpm_couple/main.o $(LIBRARY)
 	$(SHOW) $(MPICXX) $(SANITIZE) -fopenmp $^ $(ALL_LIBS) -o $@
 $(BUILD)/dempm-pack: $(BUILD)/cuda_rve/rve_pack_main.o $(LIBRARY)
+	$(SHOW) $(CC) $(SANITIZE) -fopenmp $^ $(C_LIBS) -o $@
+$(BUILD)/dempm-rve: $(BUILD)/cuda_rve/rve_element_main.o $(LIBRARY)
 	$(SHOW) $(CC) $(SANITIZE) -fopenmp $^ $(C_LIBS) -o $@
 
 # Tests named test_mpi_* need MPI, tests in C++ the VTK library; the others only plain C.
@@ -163,8 +166,9 @@ else
 endif
 
 install: programs
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/doc/dempm/doc
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/doc/dempm/doc $(DESTDIR)$(PREFIX)/share/dempm
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 examples/element_tests/plot.py $(DESTDIR)$(PREFIX)/share/dempm/element_plot.py
 	install -m 644 README.md LICENSE CHANGELOG.md $(DESTDIR)$(PREFIX)/share/doc/dempm
 	install -m 644 doc/*.md $(DESTDIR)$(PREFIX)/share/doc/dempm/doc
 clean:
@@ -189,7 +193,7 @@ $(BUILD)/packages: Makefile
 	fi && touch $@
 
 help:
-	@echo "make              build/dempm and build/dempm-pack"
+	@echo "make              build/dempm, build/dempm-pack and build/dempm-rve"
 	@echo "make demo         the collapse of a granular column; pictures in examples/column_collapse/out"
 	@echo "make test         unit tests and scenes (test-unit, test-scenes: one of them; test-gpu: on a GPU)"
 	@echo "make bench        timings of the RVE engine on the CPU (bench-gpu: on a GPU)"

@@ -5,26 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "rve_backend.h"
+#include "rve_batch_private.h"
 #include "rve_outcome.h"
-
-typedef struct Workspace { /* one thread's */
-  void *memory;
-  size_t bytes;
-} Workspace;
-
-struct RveBatch {
-  RveScene scene;
-  RveFeatures features;
-  const RveKernels *kernels;
-  RveDevice *device; /* NULL on the CPU */
-  int count;
-  RveRecord *record;
-  int threads;
-  Workspace *workspace;
-  RveDeviceJob *job; /* [count] on a device */
-  char name[24];
-};
 
 /* -------------------------------------------------------------------------------------------------- which kernels */
 
@@ -45,7 +27,7 @@ static const RveKernels *choose_kernels(const RveScene *scene) {
 
 /* ----------------------------------------------------------------------------------------------------- one record */
 
-static BaseStatus reserve(Workspace *workspace, const RveCounts *counts, int pairs, RveScratch *scratch) {
+static BaseStatus reserve(RveWorkspace *workspace, const RveCounts *counts, int pairs, RveScratch *scratch) {
   const size_t bytes = rve_scratch_layout(counts, pairs, NULL, scratch);
   if (bytes > workspace->bytes) {
     base_free(workspace->memory);
@@ -63,7 +45,7 @@ static int pairs_for(const RveRecord *record) {
 }
 
 /* Runs a call on the host; grows the arena as often as a list needs it. */
-static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const RveCall *call, Workspace *workspace) {
+static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const RveCall *call, RveWorkspace *workspace) {
   for (;;) {
     RveScratch scratch;
     TRY(reserve(workspace, &record->counts, pairs_for(record), &scratch));
@@ -85,7 +67,7 @@ static void measure_record(const RveBatch *batch, RveRecord *record, const RveCa
 static const RveInput nothing = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0};
 
 /* Lists and forces of the present state, without time passing and without work done; then the answer. */
-static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, Workspace *workspace) {
+static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, RveWorkspace *workspace) {
   RveHead *head = rve_head(record->arena);
   RveCall call;
   const double friction = head->friction_work, damping = head->damping_work;
@@ -97,8 +79,9 @@ static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, Works
   return BASE_OK;
 }
 
-static BaseStatus step_record(const RveBatch *batch, RveRecord *record, const RveInput *input, double duration,
-                              Workspace *workspace) {
+static BaseStatus step_record(RveBatch *batch, int rve, const RveInput *input, double duration,
+                              RveWorkspace *workspace) {
+  RveRecord *record = &batch->record[rve];
   RveCall call;
   const double work_before = rve_head(record->arena)->friction_work;
   TRY(rve_call_make(&batch->scene, rve_head(record->arena), input, duration, &call));
@@ -106,9 +89,11 @@ static BaseStatus step_record(const RveBatch *batch, RveRecord *record, const Rv
     record->last.status = BASE_ERROR_UNSTABLE;
     return BASE_OK;
   }
+  workspace->kept = batch->keep && rve_may_fail(batch, record, &call);
+  if (workspace->kept) TRY(rve_keep_before(record, workspace));
   if (call.steps > 0) TRY(run_record(batch, record, &call, workspace));
   measure_record(batch, record, &call, work_before, duration);
-  return BASE_OK;
+  return rve_head(record->arena)->failed ? rve_note_failure(batch, rve, &call, input, duration, workspace) : BASE_OK;
 }
 
 /* ------------------------------------------------------------------------------------------------------- creation */
@@ -204,6 +189,7 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   TRY_GOTO(choose_backend(batch, backend), status, failed);
   TRY_GOTO(set_threads(batch), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->record), status, failed);
+  TRY_GOTO(BASE_ALLOC((size_t)count, &batch->failed), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)packing_count, &model), status, failed);
   for (int k = 0; k < packing_count; k++)
     TRY_GOTO(rve_record_from_packing(batch->kernels, scene, &packings[k], &model[k]), status, failed);
@@ -219,7 +205,9 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   TRY_GOTO(refresh(batch, count, NULL), status, failed);
   for (int k = 0; k < count; k++)
     if (rve_head(batch->record[k].arena)->failed) {
-      status = base_error(BASE_ERROR_ARGUMENT, "RVE %d: the cell is too narrow for its grains", k);
+      const RveCall still = {.steps = 0};
+      TRY_GOTO(rve_note_failure(batch, k, &still, &nothing, 0.0, NULL), status, failed);
+      status = base_error(BASE_ERROR_ARGUMENT, "RVE %d: %s", k, batch->failed[k]->failure.cause);
       goto failed;
     }
   *result = batch;
@@ -234,11 +222,16 @@ failed:
 void rve_batch_destroy(RveBatch *batch) {
   if (!batch) return;
   for (int k = 0; batch->record && k < batch->count; k++) rve_record_destroy(&batch->record[k]);
-  for (int k = 0; k < batch->threads; k++) base_free(batch->workspace[k].memory);
+  for (int k = 0; batch->failed && k < batch->count; k++) rve_forget_failure(batch, k);
+  for (int k = 0; k < batch->threads; k++) {
+    base_free(batch->workspace[k].memory);
+    base_free(batch->workspace[k].before.arena);
+  }
   rve_device_destroy(batch->device);
   base_free(batch->workspace);
   base_free(batch->job);
   base_free(batch->record);
+  base_free(batch->failed);
   base_free(batch);
 }
 
@@ -304,6 +297,10 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
       record->last = job->answer;
       rve_head(record->arena)->failed = record->last.status;
       rve_head(record->arena)->temperature = job->call.temperature;
+      if (!record->last.status || !input) continue;
+      TRY(download(batch, job->rve));
+      rve_head(record->arena)->failed = record->last.status;
+      TRY(rve_note_failure(batch, job->rve, &job->call, &nothing, duration, NULL));
     }
     pending = left;
   }
@@ -321,8 +318,8 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
   } else {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
     for (int k = 0; k < n; k++) {
-      BaseStatus status = step_record(batch, &batch->record[index ? index[k] : k], &input[k], duration,
-                                      &batch->workspace[omp_get_thread_num()]);
+      BaseStatus status =
+          step_record(batch, index ? index[k] : k, &input[k], duration, &batch->workspace[omp_get_thread_num()]);
       if (status != BASE_OK) {
 #pragma omp critical(rve_step)
         first = status;
@@ -338,11 +335,7 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
     answer[k] = batch->record[index ? index[k] : k].last;
     if (answer[k].status != BASE_OK) unstable = index ? index[k] : k;
   }
-  if (unstable >= 0)
-    return base_error(BASE_ERROR_UNSTABLE,
-                      "RVE %d is unstable: a grain ran away, a value is not finite, or the cell is too narrow",
-                      unstable);
-  return BASE_OK;
+  return unstable >= 0 ? rve_failure_error(batch, unstable) : BASE_OK;
 }
 
 /* -------------------------------------------------------------------------------------------------------- changes */
@@ -418,6 +411,7 @@ BaseStatus rve_batch_unpack(RveBatch *batch, int rve, const void *bytes, size_t 
   int canonical;
   TRY(check_rve(batch, rve));
   TRY(rve_record_unpack(batch->kernels, rve_scene_hash(&batch->scene), bytes, size, &batch->record[rve], &canonical));
+  rve_forget_failure(batch, rve);
   if (canonical) return refresh(batch, 1, &rve);
   return upload(batch, rve);
 }

@@ -79,8 +79,11 @@ static void slot_geometry(RveSlot *slot) {
   const RveArrays *a = &slot->record->arrays;
   const double *h = rve_head(slot->record->arena)->cell;
   double x[3] = {0.0, 0.0, 0.0}, square = 0.0;
-  for (int k = 0; k < slot->record->counts.dimension; k++)
-    x[k] = (double)(a->position[k][slot->j] - a->position[k][slot->i] + slot->image[k] * RVE_ONE) * RVE_UNIT;
+  for (int k = 0; k < slot->record->counts.dimension; k++) {
+    /* unsigned: a grain that ran away may be anywhere */
+    const uint64_t apart = (uint64_t)a->position[k][slot->j] - (uint64_t)a->position[k][slot->i];
+    x[k] = (double)(int64_t)(apart + (uint64_t)(slot->image[k] * RVE_ONE)) * RVE_UNIT;
+  }
   for (int k = 0; k < 3; k++) {
     slot->branch[k] = h[3 * k] * x[0] + h[3 * k + 1] * x[1] + h[3 * k + 2] * x[2];
     square += slot->branch[k] * slot->branch[k];

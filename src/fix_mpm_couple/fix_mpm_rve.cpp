@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "fix_mpm_rve.h"
 
+#include <unistd.h>
+
 #include <climits>
 #include <cmath>
 #include <cstring>
@@ -29,6 +31,7 @@ FixMPMRve::FixMPMRve(LAMMPS *lammps, int narg, char **arg)
       scene_(rve_scene_default()),
       tangential_(true),
       backend_(RVE_BACKEND_AUTO),
+      replay_directory_("."),
       law_(NULL),
       assigned_(false),
       install_pending_(false),
@@ -47,7 +50,7 @@ FixMPMRve::~FixMPMRve() {
 void FixMPMRve::read_keywords(int narg, char **arg) {
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
-                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "backend", "threads"});
+                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "backend", "threads", "replay"});
   while (parser.next()) {
     if (parser.is("packing")) {
       do packing_files_.push_back(parser.word("the name of a file with a periodic packing"));
@@ -69,6 +72,7 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
       backend_ =
           (RveBackend[]){RVE_BACKEND_AUTO, RVE_BACKEND_CPU, RVE_BACKEND_CUDA}[parser.choice({"auto", "cpu", "cuda"})];
     else if (parser.is("threads")) scene_.threads = parser.integer(0, 4096);
+    else if (parser.is("replay")) read_replay(parser);
   }
   check_keywords(parser);
   read_packings(0.0);
@@ -108,6 +112,13 @@ void FixMPMRve::read_bonds(KeywordParser &parser) {
   if (!parser.accept("melting"))
     parser.refuse(parser.has_value() ? parser.word("") : "", "melting TS|none after shear_ratio M");
   scene_.bond_melting_temperature = parser.accept("none") ? HUGE_VAL : parser.number(NumberRange::any());
+}
+
+void FixMPMRve::read_replay(KeywordParser &parser) {
+  replay_directory_ = parser.word("none or a directory that exists");
+  if (replay_directory_ == "none") replay_directory_.clear();
+  else if (access(replay_directory_.c_str(), W_OK | X_OK) != 0)
+    parser.refuse(replay_directory_, "none or a directory that exists and can be written to");
 }
 
 /* A restart file of LIGGGHTS keeps tangential displacements: without their stiffness (0) contacts start with none, far from
@@ -178,6 +189,7 @@ void FixMPMRve::prepare(const char *user, int type, bool thermal) {
   }
   if (scene.tangential_stiffness > 0.0) read_packings(scene.tangential_stiffness);
   fix_check(lmp, this, rve_law_create(world, &scene, packings_.data(), (int)packings_.size(), backend_, &law_));
+  fix_check(lmp, this, rve_law_set_replay(law_, replay_directory_.empty() ? NULL : replay_directory_.c_str()));
   if (!restart_state_.empty()) {
     fix_check(lmp, this, rve_law_unpack(law_, restart_state_.data(), restart_state_.size()));
     restart_state_.clear();

@@ -23,7 +23,7 @@ namespace LAMMPS_NS {
  *   fix ID group mpm/rve packing FILE [FILE2 ...] model hooke/stiffness tangential history|off density RHO
  *       [grain disk|sphere] [thickness Z] [damping none|local A|viscous F] [pipe_resistance A] [reference T0]
  *       [bonds strength B shear_ratio M melting TS|none] [substeps N] [timestep/dem DT] [skin S] [rotation yes|no]
- *       [backend auto|cpu|cuda] [threads N]
+ *       [backend auto|cpu|cuda] [threads N] [replay DIRECTORY|none]
  *
  * `grain` and `thickness` are required in 2D; `pipe_resistance` and `reference` with `thermal yes` of fix mpm/couple.
  * Grains' properties come from `fix property/global`: kn, kt, coefficientFriction, gamman, gammat (peratomtypepair) and
@@ -60,6 +60,7 @@ class FixMPMRve : public Fix {
   std::vector<std::string> packing_files_;
   std::vector<RvePacking> packings_;
   RveBackend backend_;
+  std::string replay_directory_; /* for packings that become unstable; empty: none */
   RveLaw *law_;
   std::string user_;                /* id of the fix mpm/couple that this law serves */
   std::vector<char> restart_state_; /* from a restart file, until the law exists */
@@ -69,6 +70,7 @@ class FixMPMRve : public Fix {
   void check_keywords(const class KeywordParser &);
   void read_damping(class KeywordParser &);
   void read_bonds(class KeywordParser &);
+  void read_replay(class KeywordParser &);
   void read_packings(double tangential_stiffness);
   void read_properties(RveScene &scene, int type, bool thermal) const;
   void check_dem_time_step(const RveScene &scene) const;

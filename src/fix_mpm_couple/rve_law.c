@@ -4,6 +4,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -67,6 +68,7 @@ void rve_law_destroy(RveLaw *law) {
   base_free(law->point_value);
   base_free(law->request_input);
   base_free(law->request_value);
+  base_free(law->replay_directory);
   MPI_Comm_free(&law->comm);
   base_free(law);
 }
@@ -214,6 +216,34 @@ static int64_t bad_request(const RveLaw *law, int requests, const int64_t *tags)
   return lowest;
 }
 
+BaseStatus rve_law_set_replay(RveLaw *law, const char *directory) {
+  base_free(law->replay_directory);
+  law->replay_directory = NULL;
+  if (!directory) return BASE_OK;
+  const size_t bytes = strlen(directory) + 1;
+  TRY(base_alloc(bytes, 1, (void **)&law->replay_directory));
+  memcpy(law->replay_directory, directory, bytes);
+  rve_store_keep_states(law->store);
+  return BASE_OK;
+}
+
+/* The error for a failed RVE; writes its replay. */
+static BaseStatus report_failure(const RveLaw *law, int handle, int64_t tag) {
+  RveFailure failure;
+  char file[512], note[768] = "";
+  TRY(rve_store_failure(law->store, handle, &failure));
+  if (law->replay_directory) {
+    snprintf(file, sizeof file, "%s/rve_%" PRId64 ".replay", law->replay_directory, tag);
+    if (rve_store_write_replay(law->store, handle, file) == BASE_OK)
+      snprintf(note, sizeof note, ". Repeat it with: dempm-rve replay %s", file);
+    else snprintf(note, sizeof note, ". No replay file: %.200s", base_error_message());
+  }
+  return base_error(BASE_ERROR_UNSTABLE,
+                    "the RVE of material point %" PRId64 " is unstable at DEM step %" PRId64 " (%" PRId64 " of %" PRId64
+                    " of its call): %s%s",
+                    tag, failure.step, failure.call_step, failure.call_steps, failure.cause, note);
+}
+
 /* This rank's RVEs; the error of the lowest tag on any rank is everybody's. */
 static BaseStatus step_requests(RveLaw *law, double dt) {
   const int64_t *asked;
@@ -229,8 +259,7 @@ static BaseStatus step_requests(RveLaw *law, double dt) {
     status = rve_store_step(law->store, requests, handles, law->request_input, dt, &unstable);
   if (unstable >= 0) {
     key = rve_store_item(law->store, unstable)->tag;
-    status = base_error(BASE_ERROR_UNSTABLE, "the RVE of material point %" PRId64 " is unstable: a grain ran away or a "
-                        "value is not finite", key);
+    status = report_failure(law, unstable, key);
   }
   TRY(rank_agree(law->comm, status, key));
 

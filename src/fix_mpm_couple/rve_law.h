@@ -54,8 +54,12 @@ BaseStatus rve_law_assign(RveLaw *law, int n, const int64_t *tags);
 BaseStatus rve_law_set_volumes(RveLaw *law, int n, const int64_t *tags, const double *volumes);
 
 /* MpmLaw view: content is the RveLaw, destroy is rve_law_destroy. update: BASE_ERROR_UNSTABLE names the lowest tag
- * whose RVE has a value that is not finite. Local. */
+ * whose RVE failed, with the DEM step and the cause. Local. */
 void rve_law_as_mpm_law(RveLaw *law, MpmLaw *mpm_law);
+
+/* An RVE that becomes unstable is written to `directory`/rve_TAG.replay, for dempm-rve replay: of each rank the one with
+ * the lowest tag. NULL (so at first): none. The directory is not created. Local; BASE_ERROR_MEMORY. */
+BaseStatus rve_law_set_replay(RveLaw *law, const char *directory);
 
 BaseStatus rve_law_totals(RveLaw *law, RveLawTotals *totals);
 BaseStatus rve_law_set_scene(RveLaw *law, const RveScene *scene);

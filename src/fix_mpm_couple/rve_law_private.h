@@ -16,6 +16,7 @@ struct RveLaw {
   RveStore *store;
   int rves_run; /* on this rank, in the last step */
   double worst_unbalanced;
+  char *replay_directory; /* NULL: no replays */
   /* Room for the plan in force. */
   int point_room, request_room;
   double *point_value;     /* [point_room][RVE_FARM_WIDTH] */

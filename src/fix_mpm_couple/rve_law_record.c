@@ -360,6 +360,7 @@ BaseStatus rve_law_unpack(RveLaw *law, const void *bytes, size_t size) {
   rve_store_destroy(law->store);
   law->farm = farm;
   law->store = store;
+  if (law->replay_directory) rve_store_keep_states(store);
   return BASE_OK;
 
 fail:

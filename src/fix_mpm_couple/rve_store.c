@@ -3,6 +3,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* The engine's batches have a fixed size. RVEs that come later get a batch of their own; when there are too many
@@ -18,6 +19,7 @@ typedef struct Slot {
 struct RveStore {
   RveScene scene;
   RveBackend backend;
+  int keep_states;
   int packing_count;
   RvePacking *packing;
   RveBatch *batch[MOST_BATCHES];
@@ -166,6 +168,7 @@ static BaseStatus merge_batches(RveStore *store) {
   for (int b = 0; b < store->batches; b++) rve_batch_destroy(store->batch[b]);
   store->batches = living > 0;
   store->batch[0] = merged;
+  if (merged) rve_batch_keep_states(merged, store->keep_states);
   for (int s = 0, target = 0; s < store->slots; s++)
     if (store->slot[s].batch >= 0) store->slot[s].batch = 0, store->slot[s].rve = target++;
   return BASE_OK;
@@ -194,6 +197,7 @@ BaseStatus rve_store_add(RveStore *store, int n, const int64_t *tag, const int *
     slot->item = (RveStoreItem){.tag = tag[k], .packing = packing[k], .grains = store->packing[packing[k]].grains,
                                 .scale = NAN, .answer = store->answer[k]};
   }
+  rve_batch_keep_states(batch, store->keep_states);
   store->batch[store->batches++] = batch;
   return BASE_OK;
 }
@@ -280,6 +284,22 @@ BaseStatus rve_store_step(RveStore *store, int n, const int *handle, const RveIn
   }
   if (duration > 0.0) store->seconds += base_seconds() - start;
   return result;
+}
+
+void rve_store_keep_states(RveStore *store) {
+  store->keep_states = 1;
+  for (int b = 0; b < store->batches; b++) rve_batch_keep_states(store->batch[b], 1);
+}
+
+BaseStatus rve_store_failure(const RveStore *store, int handle, RveFailure *failure) {
+  return rve_batch_failure(store->batch[store->slot[handle].batch], store->slot[handle].rve, failure);
+}
+
+BaseStatus rve_store_write_replay(const RveStore *store, int handle, const char *file) {
+  const Slot *slot = &store->slot[handle];
+  char name[RVE_NAME_BYTES];
+  snprintf(name, sizeof name, "of material point %" PRId64, slot->item.tag);
+  return rve_batch_write_replay(store->batch[slot->batch], slot->rve, name, file);
 }
 
 BaseStatus rve_store_refresh(RveStore *store) {

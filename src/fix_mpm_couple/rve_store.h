@@ -4,7 +4,7 @@
 #ifndef DEMPM_RVE_STORE_H
 #define DEMPM_RVE_STORE_H
 
-#include "../cuda_rve/rve.h"
+#include "../cuda_rve/rve_replay.h"
 
 typedef struct RveStore RveStore;
 
@@ -39,6 +39,11 @@ BaseStatus rve_store_reserve(RveStore *store, int n);
  * BASE_ERROR_UNSTABLE: *unstable is the handle of the one with the lowest tag; -1 else. */
 BaseStatus rve_store_step(RveStore *store, int n, const int *handle, const RveInput *input, double duration,
                           int *unstable);
+/* States are kept from now on (rve_batch_keep_states()), so that failures can be written. */
+void rve_store_keep_states(RveStore *store);
+/* What the watchdog saw, and the failure's replay file: rve_batch_failure(), rve_batch_write_replay() with the tag. */
+BaseStatus rve_store_failure(const RveStore *store, int handle, RveFailure *failure);
+BaseStatus rve_store_write_replay(const RveStore *store, int handle, const char *file);
 /* Answers for the present state, without stepping, into the items of all RVEs. */
 BaseStatus rve_store_refresh(RveStore *store);
 

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* The RveBatch as its own source files see it: rve_batch.c steps, rve_watchdog.c says why an RVE failed. */
+#ifndef DEMPM_RVE_BATCH_PRIVATE_H
+#define DEMPM_RVE_BATCH_PRIVATE_H
+
+#include "rve_backend.h"
+#include "rve_replay.h"
+
+typedef struct RveWorkspace { /* one thread's */
+  void *memory;
+  size_t bytes;
+  RveRecord before; /* the RVE as it was before the call, if kept = 1; its arena has room for `room` bytes */
+  size_t room;
+  int kept;
+} RveWorkspace;
+
+/* All about a failed RVE. */
+typedef struct RveFailed {
+  RveFailure failure;
+  RveScene scene;
+  RveInput input;
+  double duration;
+  void *state; /* as rve_batch_pack() would have written it before the call; NULL if it was not kept */
+  size_t bytes;
+} RveFailed;
+
+struct RveBatch {
+  RveScene scene;
+  RveFeatures features;
+  const RveKernels *kernels;
+  RveDevice *device; /* NULL on the CPU */
+  int count;
+  RveRecord *record;
+  RveFailed **failed; /* [count], NULL while all is well */
+  int keep;           /* states before calls */
+  int threads;
+  RveWorkspace *workspace;
+  RveDeviceJob *job; /* [count] on a device */
+  char name[24];
+};
+
+/* 1 if the record's state is worth a copy before this call. */
+int rve_may_fail(const RveBatch *batch, const RveRecord *record, const RveCall *call);
+/* Copies the record's state into the thread's memory. */
+BaseStatus rve_keep_before(const RveRecord *record, RveWorkspace *workspace);
+/* Finds out why the record failed in this call and remembers it, with the kept state if workspace is not NULL. */
+BaseStatus rve_note_failure(RveBatch *batch, int rve, const RveCall *call, const RveInput *input, double duration,
+                            const RveWorkspace *workspace);
+/* BASE_ERROR_UNSTABLE with the RVE's number, DEM step and cause. */
+BaseStatus rve_failure_error(const RveBatch *batch, int rve);
+void rve_forget_failure(RveBatch *batch, int rve);
+
+#endif
