@@ -67,6 +67,7 @@ PROGRAMS := $(if $(wildcard src/fix_mpm_couple/main.cpp),$(BUILD)/dempm) \
 TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c)) \
          $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
+BENCH_OBJECTS := $(ISAS:%=$(BUILD)/bench/isa/%.o)
 FUZZERS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(wildcard tests/fuzz/fuzz_*.c))
 
 # ------------------------------------------------------------------------------------------------------- compile, link
@@ -115,9 +116,13 @@ $(BUILD)/tests/%: tests/unit/%.c $(LIBRARY)
 $(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(MPICXX) $(CXX_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(ALL_LIBS) -o $@
-$(BUILD)/bench/%: tests/bench/%.c $(LIBRARY)
+$(BUILD)/bench/%: tests/bench/%.c $(BENCH_OBJECTS) $(LIBRARY)
 	@mkdir -p $(@D)
-	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $^ $(C_LIBS) -o $@
+$(BUILD)/bench/isa/%.o: tests/bench/isa.c $(READY)
+	@mkdir -p $(@D)
+	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -Isrc -c $< -o $@
+.SECONDARY: $(BENCH_OBJECTS)
 $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
