@@ -12,13 +12,14 @@ OPT ?= -O3 -g
 WERROR ?=#                         -Werror in .ci/run
 SANITIZE ?=
 DEPS ?= yes
+ROUNDS ?= 5#                       of make bench
 
 .DEFAULT_GOAL := all
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize fuzz run-fuzzers check-cuda install clean \
-         help deps programs FORCE
+PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
+         check-cuda install clean help deps programs FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -149,10 +150,15 @@ fuzz:
 	+$(SANITIZED) run-fuzzers
 run-fuzzers: $(FUZZERS)
 	$(foreach f,$(FUZZERS),DEMPM_TEST_DATA=tests/data $(f) &&) true
-bench: programs $(BENCHES)
-	$(foreach b,$(BENCHES),$(b) cpu &&) true
+bench: programs $(BENCHES) $(BUILD)/peers
+	$(BUILD)/bench/bench_rve cpu
+	$(BUILD)/bench/bench_mpm cpu
+	$(PYTHON) tests/bench/rve.py $(BUILD) --rounds $(ROUNDS)
 bench-gpu: programs $(BENCHES)
-	$(foreach b,$(BENCHES),$(b) cuda &&) true
+	$(BUILD)/bench/bench_rve cuda
+	$(PYTHON) tests/bench/rve.py $(BUILD) --gpu
+bench-peers-native: $(BUILD)/peers
+	tests/bench/lammps_native $(BUILD)/bench/lammps-native
 demo: programs
 	$(RUN_ENV) DEMPM=$(abspath $(BUILD)/dempm) DEMPM_PACK=$(abspath $(BUILD)/dempm-pack) examples/column_collapse/run
 
@@ -177,17 +183,18 @@ clean:
 # ------------------------------------------------------------------------------------------------------------ packages
 PACKAGES = gcc g++ liggghts libliggghts-dev openmpi-bin libopenmpi-dev libvtk9-dev libcmocka-dev python3 python3-numpy \
            python3-scipy python3-matplotlib python3-vtk9 python3-pytest
+PEERS = lammps yade util-linux
 deps: $(BUILD)/packages
-$(BUILD)/packages: Makefile
-	@mkdir -p $(@D)
-	@command -v dpkg-query >/dev/null || { echo "deps: no dpkg here; taking for granted: $(PACKAGES)"; touch $@; exit 0; }; \
-	missing=; for p in $(PACKAGES); do \
+$(BUILD)/packages $(BUILD)/peers: Makefile
+	@mkdir -p $(@D); wanted="$(if $(filter %/peers,$@),$(PEERS),$(PACKAGES))"; \
+	command -v dpkg-query >/dev/null || { echo "deps: no dpkg here; taking for granted: $$wanted"; touch $@; exit 0; }; \
+	missing=; for p in $$wanted; do \
 	  case "$$(dpkg-query -W -f '$${db:Status-Abbrev}' $$p 2>/dev/null)" in ii*) ;; *) missing="$$missing $$p";; esac; done; \
 	if [ -n "$$missing" ]; then \
 	  if [ "$(DEPS)" = no ]; then echo "deps: DEPS=no, but these packages are missing:$$missing" >&2; exit 1; fi; \
 	  sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
 	  echo "deps: installing$$missing"; \
-	  get="$$sudo env DEBIAN_FRONTEND=noninteractive apt-get -y -q"; \
+	  get="$$sudo env DEBIAN_FRONTEND=noninteractive apt-get -y -q -o DPkg::Lock::Timeout=600"; \
 	  { apt-cache show $$missing >/dev/null 2>&1 && $$get install --no-install-recommends $$missing; } || \
 	  { $$get update && $$get install --no-install-recommends $$missing; }; \
 	fi && touch $@
@@ -196,7 +203,8 @@ help:
 	@echo "make              build/dempm and build/dempm-pack"
 	@echo "make demo         the collapse of a granular column; pictures in examples/column_collapse/out"
 	@echo "make test         unit tests and scenes (test-unit, test-scenes: one of them; test-gpu: on a GPU)"
-	@echo "make bench        timings of the RVE engine on the CPU (bench-gpu: on a GPU)"
+	@echo "make bench        timings, also of LIGGGHTS, LAMMPS and YADE with the same job (bench-gpu: on a GPU; ROUNDS=5)"
+	@echo "make bench-peers-native   LAMMPS compiled for this machine, for make bench to compare with"
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
