@@ -47,7 +47,6 @@ def last_json(output):
 
 class Dempm:
     skins = [0.0, 0.04, 0.06, 0.08, 0.12, 0.16]  # of the largest radius; 0: found by itself
-    tries = 3
 
     def __init__(self, name, build, damping):
         self.name, self.program, self.damping = name, build / "bench" / "bench_rve_shear", damping
@@ -72,7 +71,6 @@ class Dempm:
 class Lammps:
     """LAMMPS, and LIGGGHTS, which has kept its parent's input and output."""
     skins = [1e-4, 2e-4, 4e-4, 7e-4, 1e-3]  # m
-    tries = 2
 
     def __init__(self, name, label, program, script, folder):
         self.name, self.label, self.program, self.script, self.folder = name, label, program, script, folder
@@ -113,7 +111,6 @@ class Lammps:
 class Yade:
     name, label = "yade", "YADE"
     skins = Lammps.skins
-    tries = 1
 
     def present(self):
         return shutil.which("yade") is not None
