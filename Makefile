@@ -12,13 +12,14 @@ OPT ?= -O3 -g
 WERROR ?=#                         -Werror in .ci/run
 SANITIZE ?=
 DEPS ?= yes
+ROUNDS ?= 5#                       of make bench
 
 .DEFAULT_GOAL := all
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize fuzz run-fuzzers check-cuda install clean \
-         help deps programs FORCE
+PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
+         check-cuda install clean help deps programs FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -69,6 +70,7 @@ PROGRAMS := $(if $(wildcard src/fix_mpm_couple/main.cpp),$(BUILD)/dempm) \
 TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c)) \
          $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
+BENCH_OBJECTS := $(ISAS:%=$(BUILD)/bench/isa/%.o)
 FUZZERS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(wildcard tests/fuzz/fuzz_*.c))
 
 # ------------------------------------------------------------------------------------------------------- compile, link
@@ -119,9 +121,13 @@ $(BUILD)/tests/%: tests/unit/%.c $(LIBRARY)
 $(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(MPICXX) $(CXX_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(ALL_LIBS) -o $@
-$(BUILD)/bench/%: tests/bench/%.c $(LIBRARY)
+$(BUILD)/bench/%: tests/bench/%.c $(BENCH_OBJECTS) $(LIBRARY)
 	@mkdir -p $(@D)
-	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $^ $(C_LIBS) -o $@
+$(BUILD)/bench/isa/%.o: tests/bench/isa.c $(READY)
+	@mkdir -p $(@D)
+	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -Isrc -c $< -o $@
+.SECONDARY: $(BENCH_OBJECTS)
 $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
@@ -148,10 +154,15 @@ fuzz:
 	+$(SANITIZED) run-fuzzers
 run-fuzzers: $(FUZZERS)
 	$(foreach f,$(FUZZERS),DEMPM_TEST_DATA=tests/data $(f) &&) true
-bench: programs $(BENCHES)
-	$(foreach b,$(BENCHES),$(b) cpu &&) true
+bench: programs $(BENCHES) $(BUILD)/peers
+	$(BUILD)/bench/bench_rve cpu
+	$(BUILD)/bench/bench_mpm cpu
+	$(PYTHON) tests/bench/rve.py $(BUILD) --rounds $(ROUNDS)
 bench-gpu: programs $(BENCHES)
-	$(foreach b,$(BENCHES),$(b) cuda &&) true
+	$(BUILD)/bench/bench_rve cuda
+	$(PYTHON) tests/bench/rve.py $(BUILD) --gpu
+bench-peers-native: $(BUILD)/peers
+	tests/bench/lammps_native $(BUILD)/bench/lammps-native
 demo: programs
 	$(RUN_ENV) DEMPM=$(abspath $(BUILD)/dempm) DEMPM_PACK=$(abspath $(BUILD)/dempm-pack) examples/column_collapse/run
 
@@ -177,17 +188,18 @@ clean:
 # ------------------------------------------------------------------------------------------------------------ packages
 PACKAGES = gcc g++ liggghts libliggghts-dev openmpi-bin libopenmpi-dev libvtk9-dev libcmocka-dev python3 python3-numpy \
            python3-scipy python3-matplotlib python3-vtk9 python3-pytest
+PEERS = lammps yade util-linux
 deps: $(BUILD)/packages
-$(BUILD)/packages: Makefile
-	@mkdir -p $(@D)
-	@command -v dpkg-query >/dev/null || { echo "deps: no dpkg here; taking for granted: $(PACKAGES)"; touch $@; exit 0; }; \
-	missing=; for p in $(PACKAGES); do \
+$(BUILD)/packages $(BUILD)/peers: Makefile
+	@mkdir -p $(@D); wanted="$(if $(filter %/peers,$@),$(PEERS),$(PACKAGES))"; \
+	command -v dpkg-query >/dev/null || { echo "deps: no dpkg here; taking for granted: $$wanted"; touch $@; exit 0; }; \
+	missing=; for p in $$wanted; do \
 	  case "$$(dpkg-query -W -f '$${db:Status-Abbrev}' $$p 2>/dev/null)" in ii*) ;; *) missing="$$missing $$p";; esac; done; \
 	if [ -n "$$missing" ]; then \
 	  if [ "$(DEPS)" = no ]; then echo "deps: DEPS=no, but these packages are missing:$$missing" >&2; exit 1; fi; \
 	  sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
 	  echo "deps: installing$$missing"; \
-	  get="$$sudo env DEBIAN_FRONTEND=noninteractive apt-get -y -q"; \
+	  get="$$sudo env DEBIAN_FRONTEND=noninteractive apt-get -y -q -o DPkg::Lock::Timeout=600"; \
 	  { apt-cache show $$missing >/dev/null 2>&1 && $$get install --no-install-recommends $$missing; } || \
 	  { $$get update && $$get install --no-install-recommends $$missing; }; \
 	fi && touch $@
@@ -196,7 +208,8 @@ help:
 	@echo "make              build/dempm, build/dempm-pack and build/dempm-rve"
 	@echo "make demo         the collapse of a granular column; pictures in examples/column_collapse/out"
 	@echo "make test         unit tests and scenes (test-unit, test-scenes: one of them; test-gpu: on a GPU)"
-	@echo "make bench        timings of the RVE engine on the CPU (bench-gpu: on a GPU)"
+	@echo "make bench        timings, also of LIGGGHTS, LAMMPS and YADE with the same job (bench-gpu: on a GPU; ROUNDS=5)"
+	@echo "make bench-peers-native   LAMMPS compiled for this machine, for make bench to compare with"
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
