@@ -67,6 +67,7 @@ PROGRAMS := $(if $(wildcard src/fix_mpm_couple/main.cpp),$(BUILD)/dempm) \
 TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c)) \
          $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
+TOOLS := $(patsubst tests/tools/%.c,$(BUILD)/tools/%,$(wildcard tests/tools/*.c))
 FUZZERS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(wildcard tests/fuzz/fuzz_*.c))
 
 # ------------------------------------------------------------------------------------------------------- compile, link
@@ -118,6 +119,9 @@ $(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
 $(BUILD)/bench/%: tests/bench/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
+$(BUILD)/tools/%: tests/tools/%.c $(LIBRARY)
+	@mkdir -p $(@D)
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
 $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
@@ -128,11 +132,11 @@ $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 RUN_ENV = DEMPM_BUILD=$(abspath $(BUILD)) MPIRUN=$(MPIRUN) PYTHON=$(PYTHON)
 PYTEST = $(RUN_ENV) $(PYTHON) -m pytest -q -p no:cacheprovider
 
-test: programs $(TESTS)
+test: programs $(TESTS) $(TOOLS)
 	$(PYTEST) tests
 test-unit: $(TESTS)
 	$(PYTEST) tests/test_unit.py
-test-scenes: programs
+test-scenes: programs $(TOOLS)
 	$(PYTEST) tests --ignore=tests/test_unit.py
 test-gpu: $(TESTS)
 	$(RUN_ENV) DEMPM_BACKEND=cuda $(PYTHON) -m pytest -q -p no:cacheprovider tests/test_unit.py
