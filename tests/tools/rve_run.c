@@ -128,9 +128,12 @@ static void half_step_back(const Run *run, RvePacking *packing) {
   base_free(goal[0]), base_free(goal[1]);
 }
 
-/* Half-step velocities of `packing` to those of the whole step that follows. */
-static void half_step_on(const Run *run, RvePacking *packing) {
-  RvePacking after = one_step(run, packing);
+/* Half-step velocities of `packing`, the present state of `batch`, to those of the whole step, through one step more. */
+static void half_step_on(const Run *run, RveBatch *batch, RvePacking *packing) {
+  RveAnswer answer;
+  RvePacking after;
+  must(rve_batch_step(batch, 1, NULL, &run->input, run->scene.time_step, &answer));
+  must(rve_batch_packing(batch, 0, &after));
   for (int k = 0; k < 3 * packing->grains; k++) {
     packing->velocity[k] = 0.5 * (packing->velocity[k] + after.velocity[k]);
     packing->spin[k] = 0.5 * (packing->spin[k] + after.spin[k]);
@@ -165,8 +168,8 @@ static int advance(const Run *run, RvePacking *packing) {
   }
   rve_packing_destroy(packing);
   must(rve_batch_packing(batch, 0, packing));
+  if (run->verlet) half_step_on(run, batch, packing);
   rve_batch_destroy(batch);
-  if (run->verlet) half_step_on(run, packing);
   return 1;
 }
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """One periodic packing for several codes: reads dempm's packings, writes LIGGGHTS and LAMMPS data files, runs rve_run."""
+import copy
 import math
 import os
 import pathlib
@@ -22,9 +23,16 @@ class Packing:
         rows = [[float(word) for word in line.split()] for line in lines[start:start + int(words["grains"][0])]]
         self.dimension = int(words["dimension"][0])
         self.edge = cell[0], cell[4], cell[8]
-        # The generator's servo leaves a shear of 1e-4 or less in the cell: dropped, for codes with orthogonal boxes.
+        # The generator's servo leaves a shear of about 1e-4 in the cell: dropped, for codes with orthogonal boxes.
         self.position = [[(row[k] + 0.5) * self.edge[k] if k < self.dimension else 0.0 for k in range(3)] for row in rows]
         self.radius = [row[3] for row in rows]
+
+    def shifted(self, part):
+        """The same packing, moved by a part of the cell's edges."""
+        other = copy.copy(self)
+        other.position = [[(x + part * edge) % edge if k < self.dimension else x
+                           for k, (x, edge) in enumerate(zip(place, self.edge))] for place in self.position]
+        return other
 
     def data(self, density, velocity=None, spin=None, rate=None, height=None):
         """Text of a data file for atom_style granular (LIGGGHTS) or sphere (LAMMPS). rate: affine velocities of this
@@ -70,6 +78,19 @@ def rve_run(packing, dimension, **keywords):
     lines = output.splitlines()
     rows = [[float(word) for word in line.split()] for line in lines if line[0] not in "#u"]
     return {name: [row[k] for row in rows] for k, name in enumerate(COLUMNS)}, code == 0, lines[-1]
+
+
+def settle(packing, folder, density, steps, **law):
+    """Brings a packing to rest in its orthogonal cell, without friction. Returns the unbalanced force and the coordination."""
+    data, grains = pathlib.Path(folder) / "settle.data", pathlib.Path(folder) / "settled.txt"
+    data.write_text(packing.data(density, height=0.05))
+    found, stable, _ = rve_run(data, packing.dimension, density=density, thickness=1.0, kt=0, local=0.5, steps=steps,
+                               grains=grains, **law)
+    assert stable
+    for i, line in enumerate(grains.read_text().splitlines()):
+        place = [float(word) for word in line.split()[1:4]]
+        packing.position[i] = [place[k] + 0.5 * packing.edge[k] if k < packing.dimension else 0.0 for k in range(3)]
+    return found["unbalanced"][-1], found["coordination"][-1]
 
 
 def zero_mean(vectors, weights):
