@@ -5,6 +5,7 @@
  *
  * Scene: grain disk|sphere  thickness  density  kn  kt  mu  gamman  gammat  viscous  local  dt  fraction.
  * Run: L xx xy xz yx ... zz (velocity gradient)  steps N  every N (a line of figures each; 0: only the last)
+ *      copies NX NY NZ (of the packing, side by side)
  *      verlet 1 (see below)  kick N VX VY VZ (the first N grains get this velocity added after the run, which is then
  *      repeated)  grains FILE (the last positions, velocities and spins).
  * Exit code 3: the RVE became unstable; the last line says at which step.
@@ -27,7 +28,7 @@ typedef struct Run {
   RveScene scene;
   RveInput input;
   int64_t steps, every;
-  int verlet, kicked;
+  int verlet, kicked, copies[3];
   double kick[3];
   const char *grains;
 } Run;
@@ -55,7 +56,7 @@ static double number(const char *text) {
 
 static void parse(char **text, Run *run) {
   RveScene *s = &run->scene;
-  double steps = 0.0, every = 0.0, verlet = 0.0, kick[4] = {0.0};
+  double steps = 0.0, every = 0.0, verlet = 0.0, kick[4] = {0.0}, copies[3] = {1.0, 1.0, 1.0};
   const Keyword table[] = {{"thickness", &s->thickness, 1},
                            {"density", &s->density, 1},
                            {"kn", &s->normal_stiffness, 1},
@@ -71,7 +72,8 @@ static void parse(char **text, Run *run) {
                            {"steps", &steps, 1},
                            {"every", &every, 1},
                            {"verlet", &verlet, 1},
-                           {"kick", kick, 4}};
+                           {"kick", kick, 4},
+                           {"copies", copies, 3}};
   while (*text) {
     const char *word = *text++;
     int known = 0;
@@ -82,11 +84,15 @@ static void parse(char **text, Run *run) {
         for (int i = 0; i < table[k].values; i++, text += *text != NULL) table[k].real[i] = number(*text);
         known = 1;
       }
-    if (!known) stop(word);
+    if (!known) {
+      fprintf(stderr, "rve_run: ERROR: unknown keyword '%s'\n", word);
+      exit(1);
+    }
   }
   run->steps = (int64_t)steps, run->every = every > 0.0 ? (int64_t)every : (int64_t)steps;
   run->verlet = verlet != 0.0, run->kicked = (int)kick[0];
   memcpy(run->kick, kick + 1, sizeof run->kick);
+  for (int k = 0; k < 3; k++) run->copies[k] = (int)copies[k];
 }
 
 static RveBatch *create(const Run *run, const RvePacking *packing) {
@@ -194,7 +200,10 @@ int main(int count, char **text) {
   run.scene.grain = run.scene.dimension == 3 ? RVE_SPHERE : RVE_DISK;
   run.scene.threads = 1;
   parse(text + 3, &run);
-  must(rve_packing_read(text[1], run.scene.dimension, &packing));
+  RvePacking tile;
+  must(rve_packing_read(text[1], run.scene.dimension, &tile));
+  must(rve_packing_replicate(&tile, run.copies, &packing));
+  rve_packing_destroy(&tile);
   const size_t n = 3 * (size_t)packing.grains;
   if (!packing.velocity) must(BASE_ALLOC(n, &packing.velocity));
   if (!packing.spin) must(BASE_ALLOC(n, &packing.spin));

@@ -163,19 +163,17 @@ def main():
     figure, panels = plt.subplots(1, 2, figsize=(10, 4.2))
     for panel, dimension in zip(panels, (2, 3)):
         strain = 100 * RATE * DT * np.arange(0, STEPS + 1, EVERY)
-        unit = 1e3
-        styles = {"LIGGGHTS": ("C0", "-"), "LAMMPS": ("C1", "-"), "YADE": ("C2", "-")}
+        colours = {"LIGGGHTS": "C0", "LAMMPS": "C1", "YADE": "C2"}
         for name, (theirs, ours) in curves(dimension, folder).items():
             found = [part for steps in (20000, STEPS) for part in deviations(theirs, ours, steps)]
             print(f"{dimension}D {name:24s} mean {{:.2%}} largest {{:.2%}} in 20,000 steps; mean {{:.2%}} largest {{:.2%}} in all"
                   .format(*found), flush=True)
-            if name not in styles:
+            if name not in colours:
                 continue
-            colour, line = styles[name]
             for column, part in enumerate(("xx", "yy")):
-                panel.plot(strain[1:], -theirs[1:, column] / unit, colour, ls=line, lw=2.5, alpha=0.45,
+                panel.plot(strain[1:], -theirs[1:, column] / 1e3, colours[name], lw=2.5, alpha=0.45,
                            label=name if column == 0 else None)
-                panel.plot(strain[1:], -ours[1:, column] / unit, colour, ls="--", lw=1.0,
+                panel.plot(strain[1:], -ours[1:, column] / 1e3, colours[name], ls="--", lw=1.0,
                            label=f"dempm, set as {name}" if column == 0 else None)
         panel.set_xlabel("strain [%]")
         panel.set_ylabel(r"$-\sigma_{xx}$ (upper), $-\sigma_{yy}$ (lower) " + ("[kN/m]" if dimension == 2 else "[kPa]"))
