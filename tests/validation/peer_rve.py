@@ -55,6 +55,10 @@ class Packing:
         return "\n".join(text) + "\n"
 
 
+# Packings are made by the kernels without special instructions: the same ones on any x86 processor.
+PLAIN = {**os.environ, "DEMPM_ISA": "plain"}
+
+
 def execute(command, **options):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, **options)
     return done.returncode, done.stdout + done.stderr
@@ -64,16 +68,16 @@ def generate(file, **keywords):
     """dempm-pack generate; keywords as there, a pair for radius."""
     words = [str(word) for key, value in keywords.items()
              for word in [key, *(value if isinstance(value, (tuple, list)) else [value])]]
-    code, output = execute([BUILD / "dempm-pack", "generate", file, *words])
+    code, output = execute([BUILD / "dempm-pack", "generate", file, *words], env=PLAIN)
     assert code == 0, output
     return file
 
 
-def rve_run(packing, dimension, **keywords):
+def rve_run(packing, dimension, env=None, **keywords):
     """(columns by name, stable, last line) of build/tools/rve_run."""
     words = [str(word) for key, value in keywords.items()
              for word in [key, *(value if isinstance(value, (tuple, list)) else [value])]]
-    code, output = execute([BUILD / "tools" / "rve_run", packing, dimension, *words])
+    code, output = execute([BUILD / "tools" / "rve_run", packing, dimension, *words], env=env)
     assert code in (0, 3), output
     lines = output.splitlines()
     rows = [[float(word) for word in line.split()] for line in lines if line[0] not in "#u"]
@@ -85,7 +89,7 @@ def settle(packing, folder, density, steps, **law):
     data, grains = pathlib.Path(folder) / "settle.data", pathlib.Path(folder) / "settled.txt"
     data.write_text(packing.data(density, height=0.05))
     found, stable, _ = rve_run(data, packing.dimension, density=density, thickness=1.0, kt=0, local=0.5, steps=steps,
-                               grains=grains, **law)
+                               grains=grains, env=PLAIN, **law)
     assert stable
     for i, line in enumerate(grains.read_text().splitlines()):
         place = [float(word) for word in line.split()[1:4]]
