@@ -22,7 +22,7 @@ from peer_rve import COLUMNS, Packing, generate, settle, zero_mean  # noqa: E402
 
 KN, KT, MU, DT, STEPS = 1e6, 8e5, 0.5, 1e-6, 1000
 DENSITY = {2: 35.3, 3: 2650.0}  # 1 m of a disk weighs what 13 mm of 2650 kg/m3 do
-SIZE = {2: dict(grains=100, thickness=1.0, pressure=5e3), 3: dict(grains=216, dimension=3, pressure=5e5)}
+SIZE = {2: dict(grains=100, thickness=1.0, pressure=5e3), 3: dict(grains=125, dimension=3, pressure=5e5)}
 SPEED = 0.1  # m/s: enough for contacts to slide, open and close
 SHIFT = 0.137  # of the cell's edges
 AXES = "xyz"
@@ -66,7 +66,7 @@ def packing(request, tmp_path_factory):
     generate(folder / "grains", radius=(0.0025, 0.005), density=DENSITY[dimension], kn=KN, kt=KT, preparation_friction=0,
              **SIZE[dimension])
     grains = Packing(folder / "grains")
-    unbalanced, coordination = settle(grains, folder, DENSITY[dimension], 60000, kn=KN)
+    unbalanced, coordination = settle(grains, folder, DENSITY[dimension], 40000, kn=KN)
     assert unbalanced < 1e-9 and coordination > 3.5
     return grains
 
