@@ -19,7 +19,7 @@ ROUNDS ?= 5#                       of make bench
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
 PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
-         check-cuda install clean help deps programs FORCE
+         check-cuda install clean help deps programs validate FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -71,6 +71,7 @@ TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*
          $(patsubst tests/unit/%.cpp,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.cpp))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/bench_*.c))
 BENCH_OBJECTS := $(ISAS:%=$(BUILD)/bench/isa/%.o)
+TOOLS := $(patsubst tests/tools/%.c,$(BUILD)/tools/%,$(wildcard tests/tools/*.c))
 FUZZERS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(wildcard tests/fuzz/fuzz_*.c))
 
 # ------------------------------------------------------------------------------------------------------- compile, link
@@ -128,6 +129,9 @@ $(BUILD)/bench/isa/%.o: tests/bench/isa.c $(READY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -Isrc -c $< -o $@
 .SECONDARY: $(BENCH_OBJECTS)
+$(BUILD)/tools/%: tests/tools/%.c $(LIBRARY)
+	@mkdir -p $(@D)
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
 $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
@@ -138,11 +142,11 @@ $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 RUN_ENV = DEMPM_BUILD=$(abspath $(BUILD)) MPIRUN=$(MPIRUN) PYTHON=$(PYTHON)
 PYTEST = $(RUN_ENV) $(PYTHON) -m pytest -q -p no:cacheprovider
 
-test: programs $(TESTS)
+test: programs $(TESTS) $(TOOLS)
 	$(PYTEST) tests
 test-unit: $(TESTS)
 	$(PYTEST) tests/test_unit.py
-test-scenes: programs
+test-scenes: programs $(TOOLS)
 	$(PYTEST) tests --ignore=tests/test_unit.py
 test-gpu: $(TESTS)
 	$(RUN_ENV) DEMPM_BACKEND=cuda $(PYTHON) -m pytest -q -p no:cacheprovider tests/test_unit.py
@@ -165,6 +169,10 @@ bench-peers-native: $(BUILD)/peers
 	tests/bench/lammps_native $(BUILD)/bench/lammps-native
 demo: programs
 	$(RUN_ENV) DEMPM=$(abspath $(BUILD)/dempm) DEMPM_PACK=$(abspath $(BUILD)/dempm-pack) examples/column_collapse/run
+
+# Compares with LAMMPS and YADE too where they are installed.
+validate: programs $(TOOLS)
+	$(foreach s,rve_stability rve_quasi_static rve_against_peers,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
 
 check-cuda:
 ifeq ($(strip $(NVCC)),)
@@ -212,6 +220,7 @@ help:
 	@echo "make bench-peers-native   LAMMPS compiled for this machine, for make bench to compare with"
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
+	@echo "make validate     the figures of doc/validation.md; also against LAMMPS and YADE where they are installed"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"

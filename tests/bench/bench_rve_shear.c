@@ -10,6 +10,7 @@
  *   damping local|viscous       local: Cundall's, 0.2, as in YADE; viscous: dashpots as in LIGGGHTS and LAMMPS
  *   gas F         the cell's edges times F: no grain touches another
  *   thermal 0|1   heat is computed as well
+ *   mixed 0|1     contact forces in FP32
  *
  * Prints one line of JSON. Seconds are wall time of the steps alone, one entry per repetition; stresses are those at
  * the end, compression positive, Pa (2D: N/m). */
@@ -43,6 +44,7 @@ static int set(Job *job, const char *keyword, const char *value) {
   else if (strcmp(keyword, "call") == 0) job->call = (int)number;
   else if (strcmp(keyword, "skin") == 0) scene->skin = number;
   else if (strcmp(keyword, "gas") == 0) job->gas = number;
+  else if (strcmp(keyword, "mixed") == 0) scene->mixed = (int)number;
   else if (strcmp(keyword, "thermal") == 0) scene->thermal = (int)number;
   else if (strcmp(keyword, "damping") == 0 && strcmp(value, "viscous") == 0)
     scene->local_damping = 0.0, scene->normal_viscosity = 2.3e4, scene->tangential_viscosity = 1.15e4;
@@ -88,7 +90,7 @@ static BaseStatus read_packing(const Job *job, RvePacking *packing) {
   return BASE_OK;
 }
 
-static BaseStatus run(const Job *job, const RvePacking *packing, char name[16], double *seconds, double *processor,
+static BaseStatus run(const Job *job, const RvePacking *packing, char name[24], double *seconds, double *processor,
                       double *first_coordination, RveAnswer *answer) {
   RveBatch *batch = NULL;
   RveInput *input = NULL;
@@ -98,7 +100,7 @@ static BaseStatus run(const Job *job, const RvePacking *packing, char name[16], 
   TRY_GOTO(rve_batch_create(&job->scene, packing, 1, NULL, job->rves, job->backend, &batch), status, done);
   TRY_GOTO(rve_batch_step(batch, job->rves, NULL, input, 0.0, answer), status, done);
   *first_coordination = answer[0].coordination;
-  snprintf(name, 16, "%s", rve_batch_backend_name(batch));
+  snprintf(name, 24, "%s", rve_batch_backend_name(batch));
   const double start = base_seconds(), used = processor_seconds();
   for (long k = 0; k < job->steps; k += job->call)
     TRY_GOTO(rve_batch_step(batch, job->rves, NULL, input, job->call * job->scene.time_step, answer), status, done);
@@ -131,7 +133,7 @@ int main(int argc, char **argv) {
   Job job;
   RvePacking packing = {0};
   RveAnswer *answer = NULL;
-  char name[16];
+  char name[24];
   double first = 0.0;
   if (!read_job(argc, argv, &job)) {
     fprintf(stderr, "usage: bench_rve_shear PACKING 2|3 [keyword value]...; the keywords are in its source\n");
