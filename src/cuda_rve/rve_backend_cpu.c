@@ -7,31 +7,11 @@
  * rve_backend_cpu.c
  *
  * Contraction of a * b + c is wanted here: all lanes run the same vector code, so it cannot make lanes differ. */
-#define RVE_NUMBER_plain 1
-#define RVE_NUMBER_avx2 2
-#define RVE_NUMBER_avx512 3
-#define RVE_NUMBER_avx512_mixed 4
-#define RVE_NUMBER_OF(isa) RVE_NUMBER_##isa
-#define RVE_NUMBER(isa) RVE_NUMBER_OF(isa)
-#if RVE_NUMBER(RVE_ISA) == 1
-#define RVE_ISA_PLAIN 1
-#elif RVE_NUMBER(RVE_ISA) == 2
-#define RVE_ISA_AVX2 1
-#elif RVE_NUMBER(RVE_ISA) == 3
-#define RVE_ISA_AVX512 1
-#elif RVE_NUMBER(RVE_ISA) == 4
-#define RVE_ISA_AVX512 1
-#define RVE_MIXED 1
-#endif
+#include "rve_isa.h"
 
 #include "rve_backend.h"
 #include "rve_measure.h"
 #include "rve_step.h"
-
-#define RVE_NAME_OF(isa) rve_kernels_##isa
-#define RVE_NAME(isa) RVE_NAME_OF(isa)
-#define RVE_TEXT_OF(isa) #isa
-#define RVE_TEXT(isa) RVE_TEXT_OF(isa)
 
 typedef int RunFunction(const RveCall *, void *, const RveCounts *, RveScratch *);
 typedef void MeasureFunction(const RveCall *, void *, const RveCounts *, double, double, RveAnswer *);
@@ -84,4 +64,4 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
 #else
 #define ROWS {8, 12}, {4, 8}
 #endif
-const RveKernels RVE_NAME(RVE_ISA) = {RVE_TEXT(RVE_ISA), RVE_PACK, ROWS, run, measure};
+const RveKernels RVE_NAME(rve_kernels) = {RVE_TEXT, RVE_PACK, ROWS, run, measure};

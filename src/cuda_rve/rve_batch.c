@@ -343,9 +343,9 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
 BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
   const RveScene *old = &batch->scene;
   TRY(rve_scene_check(scene));
-  if (rve_scene_hash(scene) != rve_scene_hash(old))
+  if (rve_scene_hash(scene) != rve_scene_hash(old) || scene->mixed != old->mixed)
     return base_error(BASE_ERROR_ARGUMENT,
-                      "dimension, grain, thickness, density, thermal, bonds and whether tangential_stiffness "
+                      "dimension, grain, thickness, density, thermal, bonds, mixed and whether tangential_stiffness "
                       "is 0 cannot change after creation");
   const int stiffer =
       scene->normal_stiffness != old->normal_stiffness || scene->tangential_stiffness != old->tangential_stiffness ||

@@ -20,7 +20,7 @@ static const char usage[] =
     "  PATH:    FILE.csv (columns time and Lxx ... Lzz, sxx ... syz, T), isotropic, oedometer, biaxial, triaxial,\n"
     "           simple-shear\n"
     "  --set    required: density kn kt mu thickness (2D); of paths: pressure rate strain duration start\n"
-    "           optional: grain gamman gammat damping/local damping/viscous rotation expansion Tref alpha\n"
+    "           optional: grain gamman gammat damping/local damping/viscous rotation precision expansion Tref alpha\n"
     "           bond_strength bond_shear_ratio bond_melting timestep timestep_fraction substeps skin threads\n"
     "           backend servo_rate servo_steps stress_tolerance approach_steps\n"
     "  --every N     a line of the answer every N DEM steps (else 200 lines)\n"

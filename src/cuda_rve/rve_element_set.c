@@ -6,7 +6,7 @@
 
 #include "rve_element.h"
 
-typedef enum SettingKind { SETTING_REAL, SETTING_INTEGER, SETTING_FLAG, SETTING_GRAIN, SETTING_BACKEND } SettingKind;
+typedef enum SettingKind { SETTING_REAL, SETTING_INTEGER, SETTING_FLAG, SETTING_GRAIN, SETTING_BACKEND, SETTING_PRECISION } SettingKind;
 typedef enum SettingRange { ANY, POSITIVE, NOT_NEGATIVE, BELOW_ONE, UP_TO_ONE, AT_LEAST_ONE } SettingRange;
 
 typedef struct Setting {
@@ -90,6 +90,7 @@ static void fill_table(ElementSettings *s, Table *table) {
   add_real(table, "skin", UP_TO_ONE, &scene->skin);
   add(table, "threads", SETTING_INTEGER, AT_LEAST_ONE, &scene->threads, NULL);
   add(table, "backend", SETTING_BACKEND, ANY, &s->backend, NULL);
+  add(table, "precision", SETTING_PRECISION, ANY, &scene->mixed, NULL);
   add(table, "pressure", SETTING_REAL, POSITIVE, &s->pressure, "isotropic biaxial triaxial simple-shear");
   add(table, "start", SETTING_REAL, POSITIVE, &s->start, "isotropic");
   add(table, "duration", SETTING_REAL, POSITIVE, &s->duration, "isotropic");
@@ -114,10 +115,11 @@ static BaseStatus read_choice(const Setting *setting, const char *text, const ch
 
 static BaseStatus read_value(const Setting *setting, const char *text) {
   static const char *const flags[3] = {"no", "yes", NULL}, *const grains[3] = {"disk", "sphere", NULL},
-                           *const backends[3] = {"auto", "cpu", "cuda"};
+                           *const backends[3] = {"auto", "cpu", "cuda"}, *const precisions[3] = {"double", "mixed", NULL};
   int choice = 0;
   char *end;
   if (setting->kind == SETTING_FLAG) return read_choice(setting, text, flags, setting->value);
+  if (setting->kind == SETTING_PRECISION) return read_choice(setting, text, precisions, setting->value);
   if (setting->kind == SETTING_GRAIN) {
     TRY(read_choice(setting, text, grains, &choice));
     *(RveGrain *)setting->value = choice ? RVE_SPHERE : RVE_DISK;

@@ -77,6 +77,7 @@ static BaseStatus check_steps(const RveScene *scene) {
     return outside("time_step_fraction", scene->time_step_fraction, "0 < time_step_fraction <= 1");
   if (scene->substeps < 0) return outside("substeps", scene->substeps, ">= 0");
   if (!(scene->skin >= 0.0 && scene->skin <= 1.0)) return outside("skin", scene->skin, "0 <= skin <= 1");
+  TRY(flag("mixed", scene->mixed));
   if (scene->threads < 0) return outside("threads", scene->threads, ">= 0");
   return BASE_OK;
 }

@@ -1,26 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* See isa.h. Compiled once per instruction set with the flags of rve_backend_cpu.c. */
-#define RVE_NUMBER_plain 1
-#define RVE_NUMBER_avx2 2
-#define RVE_NUMBER_avx512 3
-#define RVE_NUMBER_OF(isa) RVE_NUMBER_##isa
-#define RVE_NUMBER(isa) RVE_NUMBER_OF(isa)
-#if RVE_NUMBER(RVE_ISA) == 1
-#define RVE_ISA_PLAIN 1
-#elif RVE_NUMBER(RVE_ISA) == 2
-#define RVE_ISA_AVX2 1
-#elif RVE_NUMBER(RVE_ISA) == 3
-#define RVE_ISA_AVX512 1
-#endif
-
+#include "cuda_rve/rve_isa.h"
 #include "isa.h"
 
 #include "cuda_rve/rve_step.h"
-
-#define NAME_OF(isa) bench_isa_##isa
-#define NAME(isa) NAME_OF(isa)
-#define TEXT_OF(isa) #isa
-#define TEXT(isa) TEXT_OF(isa)
 
 /* Keeps the compiler from folding a loop whose result nobody wants. */
 #if defined(RVE_ISA_AVX512)
@@ -57,7 +40,7 @@ static double multiply_add(long steps, double *flop) {
     EACH(STEP)
     EACH(STEP_KEEP)
   }
-  *flop = 2.0 * 12 * RVE_LANES * (double)steps;
+  *flop = 2.0 * 12 * RVE_SPAN * (double)steps;
   return base_seconds() - start;
 }
 
@@ -65,11 +48,11 @@ static double read_numbers(const double *numbers, long count, long sweeps) {
   rve_real a = rve_set(0.0), b = a, c = a, d = a;
   const double start = base_seconds();
   for (long s = 0; s < sweeps; s++)
-    for (int i = 0; i + 4 * RVE_LANES <= count; i += 4 * RVE_LANES) {
+    for (int i = 0; i + 4 * RVE_SPAN <= count; i += 4 * RVE_SPAN) {
       a = a + rve_load(numbers, i);
-      b = b + rve_load(numbers, i + RVE_LANES);
-      c = c + rve_load(numbers, i + 2 * RVE_LANES);
-      d = d + rve_load(numbers, i + 3 * RVE_LANES);
+      b = b + rve_load(numbers, i + RVE_SPAN);
+      c = c + rve_load(numbers, i + 2 * RVE_SPAN);
+      d = d + rve_load(numbers, i + 3 * RVE_SPAN);
       KEEP(a);
       KEEP(b);
       KEEP(c);
@@ -83,7 +66,7 @@ static double gather(const double *rows, const uint32_t *offset, long count, lon
   rve_real a = rve_set(0.0), b = a, c = a, d = a;
   const double start = base_seconds();
   for (long s = 0; s < sweeps; s++)
-    for (long i = 0; i < count; i += RVE_PACK) {
+    for (long i = 0; i < count; i += RVE_SPAN) {
       const RveQuad q = rve_gather(rows, none, offset, (int)i);
       a = a + q.f[0], b = b + q.f[1], c = c + q.f[2], d = d + q.f[3];
       KEEP(a);
@@ -94,4 +77,4 @@ static double gather(const double *rows, const uint32_t *offset, long count, lon
   return base_seconds() - start;
 }
 
-const BenchIsa NAME(RVE_ISA) = {TEXT(RVE_ISA), only_2d, multiply_add, read_numbers, gather};
+const BenchIsa RVE_NAME(bench_isa) = {RVE_TEXT, only_2d, multiply_add, read_numbers, gather};
