@@ -259,7 +259,8 @@ RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a
   rve_scatter(a->row + 4, 8, none, lane0, t);
 }
 
-RVE_FN void near_branch(int dim, const rve_near h[9], const near_int si[3], const near_int sj[3], near_image image,
+/* The rounding of H alone would stretch all branches of a direction alike. */
+RVE_FN void near_branch(int dim, const rve_near h[18], const near_int si[3], const near_int sj[3], near_image image,
                         rve_near d[3]) {
   const rve_int low = _mm512_cvtepu16_epi64(_mm256_castsi256_si128(image)),
                 high = _mm512_cvtepu16_epi64(_mm256_extracti128_si256(image, 1));
@@ -268,7 +269,9 @@ RVE_FN void near_branch(int dim, const rve_near h[9], const near_int si[3], cons
     x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(si[k].half[0], sj[k].half[0], low, k)),
                      _mm512_cvtepi64_ps(rve_fraction(si[k].half[1], sj[k].half[1], high, k)));
   for (int k = 0; k < dim; k++) {
-    d[k] = h[3 * k] * x[0] + h[3 * k + 1] * x[1];
+    d[k] = h[9 + 3 * k] * x[0] + h[9 + 3 * k + 1] * x[1];
+    if (dim == 3) d[k] = d[k] + h[9 + 3 * k + 2] * x[2];
+    d[k] = d[k] + h[3 * k] * x[0] + h[3 * k + 1] * x[1];
     if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
   }
 }

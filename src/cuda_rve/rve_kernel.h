@@ -13,7 +13,7 @@
 /* --------------------------------------------------------------------------------------------------- contact pass */
 
 typedef struct RveContactPass {
-  rve_near h[9];    /* H times RVE_UNIT */
+  rve_near h[9 * RVE_PARTS]; /* H times RVE_UNIT; in FP32 also what its rounding left */
   rve_near rate[9]; /* D */
   rve_near turn[9];
   rve_near kn, kt_dt, kt, mu, dt, gn, gt, gc, bond, bond_ratio;
@@ -32,7 +32,9 @@ RVE_FN double rve_bond_force_factor(const RveCall *call, double temperature) {
 RVE_FN RveContactPass rve_contact_pass_of(const RveCall *call, const RveHead *head, double dt) {
   RveContactPass c;
   for (int k = 0; k < 9; k++) {
-    c.h[k] = near_set(head->cell[k] * RVE_UNIT);
+    const double h = head->cell[k] * RVE_UNIT;
+    c.h[k] = near_set(h);
+    if (RVE_PARTS == 2) c.h[9 + k] = near_set(h - (float)h);
     c.rate[k] = near_set(call->rate[k]);
     c.turn[k] = near_set(call->turn[k]);
   }
