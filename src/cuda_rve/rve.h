@@ -53,6 +53,8 @@ typedef struct RveScene {
   int substeps;               /* 0: ceil(duration / time_step), physical time (errata A.6). N > 0: exactly N DEM steps per
                                  call, the whole deformation spread over them (quasi-static relaxation time) */
   double skin;                /* neighbour skin as a fraction of the largest radius; 0 = automatic */
+  int share;                  /* 1: RVEs with the same packing and the same calls so far are computed once (default); the
+                                 results are the same to the last bit. 0: each by itself, e.g. to time them */
   int mixed;                  /* 1: contact forces in FP32, sums and positions as ever; needs AVX-512, else FP64 runs (see
                                  rve_batch_backend_name). Stresses differ by about 1e-5 of the mean stress. Default 0 */
   int threads;                /* OpenMP threads; 0 = OpenMP's own choice */
@@ -131,6 +133,10 @@ BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene);
  * BASE_ERROR_UNSTABLE if any RVE's status says so (all answers are written). */
 BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration,
                           RveAnswer *answer);
+
+/* How many RVE steps were copies of another RVE's with the same packing and the same calls so far (results are the same to the
+ * last bit). Restored RVEs count as having histories of their own. */
+int64_t rve_batch_shared(const RveBatch *batch);
 
 /* Bonds every contact with overlap > 0 of the given RVEs (NULL: all). Requires scene.bonds. */
 BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index);

@@ -190,6 +190,10 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   TRY_GOTO(set_threads(batch), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->record), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->failed), status, failed);
+  TRY_GOTO(BASE_ALLOC((size_t)count, &batch->history), status, failed);
+  TRY_GOTO(BASE_ALLOC((size_t)count, &batch->twin), status, failed);
+  for (int k = 0; k < count; k++) batch->history[k] = packing_of_rve ? (uint64_t)packing_of_rve[k] : 0;
+  batch->histories = (uint64_t)packing_count;
   TRY_GOTO(BASE_ALLOC((size_t)packing_count, &model), status, failed);
   for (int k = 0; k < packing_count; k++)
     TRY_GOTO(rve_record_from_packing(batch->kernels, scene, &packings[k], &model[k]), status, failed);
@@ -232,6 +236,8 @@ void rve_batch_destroy(RveBatch *batch) {
   base_free(batch->job);
   base_free(batch->record);
   base_free(batch->failed);
+  base_free(batch->history);
+  base_free(batch->twin);
   base_free(batch);
 }
 
@@ -307,6 +313,38 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
   return BASE_OK;
 }
 
+/* Steps the first of each set of twins, then copies it. A twin of one that failed fails by itself. */
+static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
+  BaseStatus first = BASE_OK;
+  int64_t copied = 0;
+  rve_twins_sort(batch, n, index, input);
+  for (int followers = 0; followers < 2; followers++) {
+    const int good = first == BASE_OK;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch)) reduction(+ : copied)
+    for (int k = 0; k < n; k++) {
+      const RveTwin *twin = &batch->twin[k];
+      const int follows = twin->leader != twin->rve;
+      BaseStatus status;
+      if (follows != followers) continue;
+      if (follows && batch->record[twin->leader].last.status == BASE_OK && good) {
+        status = rve_twins_copy(batch, twin->leader, twin->rve);
+        copied++;
+      } else {
+        status = step_record(batch, twin->rve, twin->input, duration, &batch->workspace[omp_get_thread_num()]);
+      }
+      if (status != BASE_OK) {
+#pragma omp critical(rve_step)
+        first = status;
+      }
+    }
+  }
+  rve_twins_renew(batch, n);
+  batch->shared += copied;
+  return first;
+}
+
+int64_t rve_batch_shared(const RveBatch *batch) { return batch->shared; }
+
 BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration,
                           RveAnswer *answer) {
   TRY(check_index(batch, n, index));
@@ -316,15 +354,7 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
   if (batch->device) {
     TRY(device_step(batch, n, index, input, duration));
   } else {
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
-    for (int k = 0; k < n; k++) {
-      BaseStatus status =
-          step_record(batch, index ? index[k] : k, &input[k], duration, &batch->workspace[omp_get_thread_num()]);
-      if (status != BASE_OK) {
-#pragma omp critical(rve_step)
-        first = status;
-      }
-    }
+    first = host_step(batch, n, index, input, duration);
   }
   if (first == BASE_ERROR_MEMORY) return base_error(first, "not enough memory for a larger neighbour list");
   if (first != BASE_OK)
@@ -366,6 +396,11 @@ BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
   return stiffer ? refresh(batch, batch->count, NULL) : BASE_OK;
 }
 
+/* RVEs that are changed alone part from their twins. */
+static void leave_twins(RveBatch *batch, int n, const int *index) {
+  for (int k = 0; k < n && (index || n < batch->count); k++) rve_twins_leave(batch, index ? index[k] : k);
+}
+
 BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index) {
   if (!batch->scene.bonds) return base_error(BASE_ERROR_ARGUMENT, "bonds = 0 (allowed: scenes with bonds)");
   if (!index && n == 0) n = batch->count;
@@ -375,6 +410,7 @@ BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index) {
     TRY(download(batch, rve));
     rve_record_install_bonds(&batch->record[rve]);
   }
+  leave_twins(batch, n, index);
   return refresh(batch, n, index);
 }
 
@@ -386,6 +422,7 @@ BaseStatus rve_batch_rest(RveBatch *batch, int n, const int *index) {
     TRY(download(batch, rve));
     rve_record_rest(&batch->record[rve]);
   }
+  leave_twins(batch, n, index);
   return refresh(batch, n, index);
 }
 
@@ -412,6 +449,7 @@ BaseStatus rve_batch_unpack(RveBatch *batch, int rve, const void *bytes, size_t 
   TRY(check_rve(batch, rve));
   TRY(rve_record_unpack(batch->kernels, rve_scene_hash(&batch->scene), bytes, size, &batch->record[rve], &canonical));
   rve_forget_failure(batch, rve);
+  rve_twins_leave(batch, rve);
   if (canonical) return refresh(batch, 1, &rve);
   return upload(batch, rve);
 }

@@ -24,6 +24,13 @@ typedef struct RveFailed {
   size_t bytes;
 } RveFailed;
 
+/* RVEs with the same history, sorted together; see rve_twins.c. */
+typedef struct RveTwin {
+  uint64_t history;
+  const RveInput *input;
+  int rve, leader; /* leader: the first of its kind */
+} RveTwin;
+
 struct RveBatch {
   RveScene scene;
   RveFeatures features;
@@ -33,11 +40,23 @@ struct RveBatch {
   RveRecord *record;
   RveFailed **failed; /* [count], NULL while all is well */
   int keep;           /* states before calls */
+  uint64_t *history;  /* [count] equal numbers: same packing, same calls */
+  uint64_t histories; /* numbers used */
+  RveTwin *twin;      /* [count] of the present call */
+  int64_t shared;     /* RVE steps copied since creation */
   int threads;
   RveWorkspace *workspace;
   RveDeviceJob *job; /* [count] on a device */
   char name[24];
 };
+
+/* Sorts the call's RVEs by history and input into batch->twin[0..n). */
+void rve_twins_sort(RveBatch *batch, int n, const int *index, const RveInput *input);
+/* Gives the RVEs of a call, or one that was changed from outside, their new histories. */
+void rve_twins_renew(RveBatch *batch, int n);
+void rve_twins_leave(RveBatch *batch, int rve);
+/* Makes RVE `to` equal to RVE `from`. */
+BaseStatus rve_twins_copy(RveBatch *batch, int from, int to);
 
 /* 1 if the record's state is worth a copy before this call. */
 int rve_may_fail(const RveBatch *batch, const RveRecord *record, const RveCall *call);

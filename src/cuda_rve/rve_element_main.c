@@ -226,6 +226,7 @@ static BaseStatus run(const Arguments *a) {
   TRY(element_settings_read(a->sets, a->set, element_path_is_builtin(a->path) ? a->path : NULL, &settings));
   TRY(rve_packing_read_history(a->file, dimension, settings.scene.tangential_stiffness, &packing));
   const int copies = isnan(a->copies) ? 1 : (int)a->copies;
+  settings.scene.share = 0; /* copies are for timing */
   if (copies == 1) settings.scene.threads = 1; /* a packing runs on one thread: others would only wait for it */
   TRY_GOTO(check_time_step(&settings, &packing), status, done);
   TRY_GOTO(rve_batch_create(&settings.scene, &packing, 1, NULL, copies, settings.backend, &batch), status, done);

@@ -19,6 +19,7 @@ RveScene rve_scene_default(void) {
   scene.bond_shear_ratio = 0.5;
   scene.bond_melting_temperature = INFINITY;
   scene.time_step_fraction = 0.5;
+  scene.share = 1;
   return scene;
 }
 
@@ -78,6 +79,7 @@ static BaseStatus check_steps(const RveScene *scene) {
   if (scene->substeps < 0) return outside("substeps", scene->substeps, ">= 0");
   if (!(scene->skin >= 0.0 && scene->skin <= 1.0)) return outside("skin", scene->skin, "0 <= skin <= 1");
   TRY(flag("mixed", scene->mixed));
+  TRY(flag("share", scene->share));
   if (scene->threads < 0) return outside("threads", scene->threads, ">= 0");
   return BASE_OK;
 }

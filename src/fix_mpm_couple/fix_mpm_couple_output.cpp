@@ -120,11 +120,14 @@ void FixMPMCouple::post_run() {
   fix_check(lmp, this, rve_law_totals(rve_->law(), &law));
   const double seconds = base_seconds() - run_started_, steps = (double)law.particle_steps - particle_steps_before_;
   if (comm->me != 0 || steps <= 0.0) return;
-  const std::string line = format_text(
+  std::string line = format_text(
       "Fix %s: %lld RVEs of %lld grains in all, %.4g DEM particle-steps, %.4g per second, %.0f %% of the time in "
       "RVEs\n",
       id, (long long)law.rves, (long long)law.grains, steps, steps / seconds,
       100.0 * (law.seconds - rve_seconds_before_) / seconds);
+  if (law.shared > 0)
+    line += format_text("Fix %s: %lld of %lld RVE steps so far were copies of an RVE with the same packing and history\n", id,
+                        (long long)law.shared, (long long)law.calls);
   if (screen) fputs(line.c_str(), screen);
   if (logfile) fputs(line.c_str(), logfile);
 }

@@ -50,7 +50,7 @@ FixMPMRve::~FixMPMRve() {
 void FixMPMRve::read_keywords(int narg, char **arg) {
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
-                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "precision", "backend", "threads", "replay"});
+                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "precision", "share", "backend", "threads", "replay"});
   while (parser.next()) {
     if (parser.is("packing")) {
       do packing_files_.push_back(parser.word("the name of a file with a periodic packing"));
@@ -68,6 +68,7 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
     else if (parser.is("timestep/dem")) scene_.time_step = parser.number(NumberRange::positive());
     else if (parser.is("skin")) scene_.skin = parser.number(NumberRange::positive());
     else if (parser.is("rotation")) scene_.rotation = parser.yes_no();
+    else if (parser.is("share")) scene_.share = parser.yes_no();
     else if (parser.is("precision")) scene_.mixed = parser.choice({"double", "mixed"});
     else if (parser.is("backend"))
       backend_ =

@@ -29,6 +29,7 @@ typedef struct RveLawTotals {
   int64_t rves, grains;    /* present */
   int64_t rves_run;        /* in the last step */
   int64_t particle_steps;  /* grains times DEM steps, since the law was created (not before a restart) */
+  int64_t calls, shared;   /* steps of RVEs since then, and how many were copies of a twin's (depends on the ranks) */
   double worst_unbalanced; /* of the last step */
   double friction_work;    /* J, slip work since the RVEs were created (per metre of depth in 2D) */
   double damping_work;     /* J, lost to local and viscous damping, likewise */

@@ -26,7 +26,7 @@ struct RveStore {
   int batches;
   int slots, unused; /* length of slot[]; first unused slot or -1 */
   Slot *slot;
-  int64_t particle_steps;
+  int64_t particle_steps, calls;
   double seconds;
   /* One step, sorted by batch. */
   int room;
@@ -257,6 +257,7 @@ static void keep_answer(RveStore *store, RveStoreItem *item, const RveAnswer *an
   if (duration > 0.0) {
     item->dissipation = work / (answer->volume * duration);
     store->particle_steps += (answer->steps - before->steps) * item->grains;
+    store->calls++;
   }
   item->answer = *answer;
 }
@@ -353,7 +354,8 @@ BaseStatus rve_store_view(const RveStore *store, int handle, RveView *view) {
 }
 
 void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
-  *totals = (RveStoreTotals){.particle_steps = store->particle_steps, .seconds = store->seconds};
+  *totals = (RveStoreTotals){.particle_steps = store->particle_steps, .calls = store->calls, .seconds = store->seconds};
+  for (int b = 0; b < store->batches; b++) totals->shared += rve_batch_shared(store->batch[b]);
   for (int s = 0; s < store->slots; s++)
     if (store->slot[s].batch >= 0) totals->grains += store->slot[s].item.grains;
 }

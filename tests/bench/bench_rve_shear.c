@@ -69,6 +69,7 @@ static int read_job(int argc, char **argv, Job *job) {
   scene->local_damping = 0.2;
   scene->time_step = 2e-6;
   scene->threads = 1;
+  scene->share = 0; /* all RVEs do the same: each must work for itself */
   scene->expansion = 1e-5;
   scene->pipe_resistance = 1e3;
   if (argc < 3) return 0;

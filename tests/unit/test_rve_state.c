@@ -85,7 +85,7 @@ static void a_restored_rve_continues_bit_for_bit(void **state) {
     RveAnswer answer, again;
     size_t size;
     MUST(rve_batch_install_bonds(batch, 0, NULL));
-    for (int call = 0; call < CALLS; call++) {
+    for (int call = 0; call < 12; call++) {
       const RveInput input = input_of(0, call);
       MUST(rve_batch_step(batch, 1, NULL, &input, 5e-4, &answer));
     }
@@ -331,6 +331,52 @@ static void cuda_is_chosen_or_refused_with_its_name(void **state) {
   rve_packing_destroy(&packing);
 }
 
+/* Twins are computed once, and it cannot be seen: not in the answers, not in the states, not after they part. */
+static void twins_are_computed_once(void **state) {
+  (void)state;
+  enum { COUNT = 6 };
+  RvePacking packings[2] = {help_random(2, 6, 1e5, 4), help_random(2, 7, 1e5, 5)};
+  const int packing_of[COUNT] = {0, 1, 0, 0, 1, 0};
+  RveBatch *batch[2];
+  RveScene scene = help_scene(2);
+  scene.tangential_stiffness = 1e6;
+  scene.bonds = 1, scene.bond_strength = 1e-4;
+  for (int share = 0; share < 2; share++) {
+    scene.share = share;
+    MUST(rve_batch_create(&scene, packings, 2, packing_of, COUNT, RVE_BACKEND_CPU, &batch[share]));
+  }
+  for (int call = 0; call < 12; call++) {
+    RveAnswer answer[2][COUNT];
+    RveInput input[COUNT];
+    const int some[3] = {0, 2, 5}, all = call != 8;
+    memset(input, 0, sizeof input);
+    for (int k = 0; k < COUNT; k++) {
+      input[k].velocity_gradient[0] = -1.0;
+      if (call >= 4 && k == 3) input[k].velocity_gradient[1] = 0.5; /* one parts from its twins */
+    }
+    for (int share = 0; share < 2; share++) {
+      if (call == 6) MUST(rve_batch_install_bonds(batch[share], 2, some));
+      MUST(rve_batch_step(batch[share], all ? COUNT : 3, all ? NULL : some, input, 1e-4, answer[share]));
+    }
+    assert_memory_equal(answer[0], answer[1], (all ? COUNT : 3) * sizeof answer[0][0]);
+  }
+  for (int k = 0; k < COUNT; k++) {
+    unsigned char *bytes[2];
+    size_t written[2];
+    for (int share = 0; share < 2; share++) {
+      MUST(BASE_ALLOC(rve_batch_state_bytes(batch[share], k), &bytes[share]));
+      MUST(rve_batch_pack(batch[share], k, bytes[share], &written[share]));
+    }
+    assert_int_equal(written[0], written[1]);
+    assert_memory_equal(bytes[0], bytes[1], written[0]);
+    for (int share = 0; share < 2; share++) base_free(bytes[share]);
+  }
+  /* packing 1: always one of two; packing 0: three of four in calls 0-3, two in 4 and 5; then bonds make singles of 0 and 2 */
+  assert_int_equal(rve_batch_shared(batch[0]), 0);
+  assert_int_equal(rve_batch_shared(batch[1]), 4 * (1 + 3) + 2 * (1 + 2) + 5 * 1);
+  for (int share = 0; share < 2; share++) rve_batch_destroy(batch[share]), rve_packing_destroy(&packings[share]);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(answers_do_not_depend_on_threads_batches_or_order),
@@ -342,6 +388,7 @@ int main(void) {
       cmocka_unit_test(wrong_calls_are_refused),
       cmocka_unit_test(wrong_packings_are_refused),
       cmocka_unit_test(cuda_is_chosen_or_refused_with_its_name),
+      cmocka_unit_test(twins_are_computed_once),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
