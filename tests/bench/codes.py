@@ -48,9 +48,8 @@ def last_json(output):
 class Dempm:
     skins = [0.0, 0.04, 0.06, 0.08, 0.12, 0.16]  # of the largest radius; 0: found by itself
 
-    def __init__(self, name, build, damping):
-        self.name, self.program, self.damping = name, build / "bench" / "bench_rve_shear", damping
-        self.label = "dempm" if damping == "local" else "dempm, dashpots"
+    def __init__(self, name, label, build, *settings):
+        self.name, self.label, self.program, self.settings = name, label, build / "bench" / "bench_rve_shear", settings
 
     def present(self):
         return self.program.exists()
@@ -58,8 +57,7 @@ class Dempm:
     def command(self, dimension, skin, steps):
         # As many repetitions as make a run of about a second: the shorter ones would be at the mercy of the timer tick.
         repeat = max(1, round((10 if dimension == 2 else 2) * steps / STEPS))
-        return [self.program, DATA[dimension], dimension, "steps", steps, "skin", skin, "damping", self.damping, "repeat",
-                repeat]
+        return [self.program, DATA[dimension], dimension, "steps", steps, "skin", skin, "repeat", repeat, *self.settings]
 
     def read(self, output):
         result = last_json(output)
@@ -125,7 +123,8 @@ class Yade:
 def all_codes(build, folder):
     """Those that are there. A native LAMMPS stands beside Debian's."""
     native = os.environ.get("LAMMPS_NATIVE") or str(build / "bench" / "lammps-native" / "lmp")
-    codes = [Dempm("dempm", build, "local"), Dempm("dempm_dashpots", build, "viscous"),
+    codes = [Dempm("dempm", "dempm", build), Dempm("dempm_dashpots", "dempm, dashpots", build, "damping", "viscous"),
+             Dempm("dempm_mixed", "dempm, mixed precision", build, "mixed", 1),
              Lammps("liggghts", "LIGGGHTS", "liggghts", "in.rve_liggghts", folder),
              Lammps("lammps", "LAMMPS", "lmp", "in.rve_lammps", folder),
              Lammps("lammps_native", "LAMMPS, native", native, "in.rve_lammps", folder), Yade()]

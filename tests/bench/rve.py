@@ -251,6 +251,7 @@ def main():
     scaling, skipping = bench.scaling(), bench.skipping()
     result["ratios"] = ratios(table, "dempm")
     result["ratios_dashpots"] = ratios(table, "dempm_dashpots")
+    result["ratios_mixed"] = ratios(table, "dempm_mixed")
     result["lammps_build"] = "native" if "lammps_native" in labels else "Debian's"
     result["particle_steps_per_second"] = {
         f"cpu_{d}d": table[f"dempm_{d}d"]["median"] for d in (2, 3) if "dempm" in labels}
