@@ -298,10 +298,12 @@ RVE_FN RveFour rve_four_zero(void) { return _mm256_setzero_pd(); }
 #elif !defined(__CUDACC__)
 RVE_FN RveFour rve_four(const double *at) {
   RveFour a;
-  memcpy(a.f, at, sizeof a.f);
+  for (int k = 0; k < 4; k++) a.f[k] = at[k];
   return a;
 }
-RVE_FN void rve_four_store(double *at, RveFour a) { memcpy(at, a.f, sizeof a.f); }
+RVE_FN void rve_four_store(double *at, RveFour a) {
+  for (int k = 0; k < 4; k++) at[k] = a.f[k];
+}
 RVE_FN RveFour rve_four_add(RveFour a, RveFour b) {
   for (int k = 0; k < 4; k++) a.f[k] += b.f[k];
   return a;
