@@ -54,12 +54,12 @@ double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair) {
   return conduct_directly(model, pair) + conduct_through_fluid(model, pair);
 }
 
-double grain_heat_distance_factor(const GrainHeat *model) {
+double grain_heat_reach(const GrainHeat *model, double radius) {
   switch (model->indirect) {
-    case GRAIN_INDIRECT_LAYER: return 1.0 + model->layer; /* gap < layer * R of the larger: worst beside a tiny grain */
+    case GRAIN_INDIRECT_LAYER: return model->layer * radius;
     case GRAIN_INDIRECT_VORONOI_A:
-    case GRAIN_INDIRECT_VORONOI_B: return 1.0 + 0.5 * model->reach;
+    case GRAIN_INDIRECT_VORONOI_B: return model->reach * radius;
     case GRAIN_INDIRECT_NONE: break;
   }
-  return 1.0;
+  return 0.0;
 }

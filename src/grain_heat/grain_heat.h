@@ -94,8 +94,9 @@ GrainHeat grain_heat_default(void);
 BaseStatus grain_heat_check(const GrainHeat *model);
 /* h of a pair, W/K. */
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
-/* Smallest f such that h = 0 for every pair, of whatever radii, whose centres are f (R0 + R1) or more apart; >= 1. */
-double grain_heat_distance_factor(const GrainHeat *model);
+/* Smallest gap between surfaces, m, from which on h = 0 for every pair of grains no larger than `radius`; 0 without an
+ * indirect model. */
+double grain_heat_reach(const GrainHeat *model, double radius);
 
 #ifdef __cplusplus
 }

@@ -259,21 +259,17 @@ static void both_sides_of_a_pair_see_the_same_bits(void **state) {
   assert_true(conducting > 10000);
 }
 
-static void nothing_conducts_beyond_the_distance_factor(void **state) {
+static void nothing_conducts_beyond_the_reach(void **state) {
   (void)state;
   uint64_t seed = 4;
   for (int indirect = 0; indirect < 4; indirect++) {
     const GrainHeat model = make_model(GRAIN_DIRECT_PIPE, (GrainIndirect)indirect, GRAIN_AREA_GEOMETRIC);
-    const double factor = grain_heat_distance_factor(&model);
+    const double reach = grain_heat_reach(&model, 1.0);
     for (int n = 0; n < 1000; n++) {
-      const double a = 1.0, b = pow(10.0, -3.0 * base_random(&seed));
-      assert_true(grain_heat_conductance(&model, &(GrainPair){{a, b}, {1, 1}, (1.0 + 1e-14) * factor * (a + b)}) == 0.0);
+      const double b = pow(10.0, -3.0 * base_random(&seed));
+      assert_true(grain_heat_conductance(&model, &(GrainPair){{1, b}, {1, 1}, 1 + b + (1.0 + 1e-12) * reach}) == 0.0);
     }
-    /* ... and not much earlier: a tiny grain is the layer's worst case, equal grains the others'. */
-    const GrainPair near = {{1, indirect == GRAIN_INDIRECT_LAYER ? 1e-6 : 1}, {1, 1}, 0};
-    GrainPair inside = near;
-    inside.distance = (factor - 1e-5) * (near.radius[0] + near.radius[1]);
-    assert_true(grain_heat_conductance(&model, &inside) > 0.0);
+    assert_true(grain_heat_conductance(&model, &(GrainPair){{1, 1}, {1, 1}, 2.0 + reach - 1e-9}) > 0.0);
   }
 }
 
@@ -319,7 +315,7 @@ int main(void) {
       cmocka_unit_test(collision_factors_meet_the_table),
       cmocka_unit_test(indirect_models_meet_own_quadratures),
       cmocka_unit_test(both_sides_of_a_pair_see_the_same_bits),
-      cmocka_unit_test(nothing_conducts_beyond_the_distance_factor),
+      cmocka_unit_test(nothing_conducts_beyond_the_reach),
       cmocka_unit_test(deep_overlaps_and_insulators_give_finite_values),
       cmocka_unit_test(wrong_models_are_refused),
   };
