@@ -97,12 +97,24 @@ void FixHeatGranGrain::init() {
   FixHeatGran::init();
 }
 
+/* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
+double FixHeatGranGrain::find_largest_radius() const {
+  double mine = 0.0, all;
+  for (int i = 0; i < atom->nlocal; i++)
+    if (atom->mask[i] & groupbit) mine = fmax(mine, atom->radius[i]);
+  for (int k = 0; k < modify->nfix; k++)
+    for (int type = 1; type < (int)conductivity_.size(); type++)
+      if (modify->fix[k]->use_rad_for_cut_neigh_and_ghost()) mine = fmax(mine, modify->fix[k]->max_rad(type));
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
+  return all;
+}
+
 /* The neighbour list holds pairs whose gap was below the skin when it was built. `neigh_modify contact_distance_factor`
  * would be another way to more distant pairs, but with it LIGGGHTS' walls of a given temperature take the root of a
  * negative contact area wherever there is a gap, and the temperatures become not-a-number. */
 void FixHeatGranGrain::check_skin() {
   if (model_.indirect == GRAIN_INDIRECT_NONE) return;
-  reach_ = grain_heat_reach(&model_, atom->get_properties()->max_radius());
+  reach_ = grain_heat_reach(&model_, find_largest_radius());
   if (neighbor->skin <= reach_)
     fix_failed(lmp, this,
                format_text("the skin (command neighbor) is %g, but the indirect model reaches over gaps of %g: allowed is "
@@ -159,7 +171,7 @@ void FixHeatGranGrain::post_force(int) {
     const int i = list->ilist[n];
     for (int k = 0; k < list->numneigh[i]; k++) {
       const int j = list->firstneigh[i][k] & NEIGHMASK;
-      if ((atom->mask[i] | atom->mask[j]) & groupbit) exchange(i, j);
+      if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j);
     }
   }
 }

@@ -17,7 +17,7 @@ FixStyle(heat/gran/grain,FixHeatGranGrain)
 
 namespace LAMMPS_NS {
 
-/* Heat conduction between LIGGGHTS' particles (pair_style gran), in place of LIGGGHTS' fix heat/gran/conduction.
+/* Heat conduction between the particles of a group (pair_style gran), in place of LIGGGHTS' fix heat/gran/conduction.
  *
  *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe
  *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
@@ -43,6 +43,7 @@ class FixHeatGranGrain : public FixHeatGran {
 
   void read_model(class KeywordParser &);
   void check_keywords(const class KeywordParser &) const;
+  double find_largest_radius() const;
   void check_skin();
   void exchange(int i, int j);
 };

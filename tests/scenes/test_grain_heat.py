@@ -5,6 +5,7 @@ import math
 import random
 
 import pytest
+from test_with_grains import GRAINS, PAIR, POINTS
 
 HEAD = """
 atom_style granular
@@ -180,6 +181,42 @@ def test_heat_crosses_gaps_up_to_the_reach_of_the_model(name, reach, dempm):
     near, far = (flow_over_gap(dempm, INDIRECT[name], gap) for gap in (1e-5, 0.99 * reach))
     assert near < far < 0.0
     assert flow_over_gap(dempm, INDIRECT[name], 1.01 * reach) == 0.0
+
+
+def test_grains_outside_the_group_exchange_no_heat(dempm):
+    rows = PAIR_ROWS + [(2, 0.004, 0.0101, 0.0185, 0.01, 100.0)]  # touches the first two
+    words = "direct batchelor indirect voronoi_b fluid 0.5"
+    script = two_grains(f"group pair id 1 2\nfix heat pair heat/gran/grain initial_temperature 300 {words}\n", 100, rows)
+    run = dempm(script.replace("0.04 0 0.02 0 0.02", "0.04 0 0.03 0 0.02"))
+    one, two, outside = last(run, "f_Temp[0]")
+    masses = last(run, "mass")
+    assert outside == 100.0 and 250.0 < two < one < two + 50.0
+    assert 0.1 * masses[0] * (one - 350.0) == pytest.approx(-0.2 * masses[1] * (two - 250.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("np", [1, 2])
+def test_material_points_do_not_disturb_the_heat_of_grains(np, dempm, tmp_path):
+    """Points lie among the grains; theirs are other temperatures, and radii above the skin."""
+    heat = """
+fix k all property/global thermalConductivity peratomtype 20 90
+fix c all property/global thermalCapacity peratomtype 0.002 0.002
+fix heat grains heat/gran/grain initial_temperature 300 direct pipe indirect voronoi_b fluid 1 reach 0.5
+run 0
+region left block INF 0.9 INF INF INF INF units box
+group left region left
+group hot intersect left grains
+set group hot property/atom Temp 400
+dump end grains custom 300 end.dump x y f_Temp[0]
+dump_modify end format "%.17g %.17g %.17g"
+run 300
+"""
+    temperatures = []
+    for name, points in (("both", POINTS), ("grains", "")):
+        run = dempm(PAIR + GRAINS + points + heat, np=np, cwd=tmp_path / name)
+        columns = run.dump("end.dump")[-1][1]
+        temperatures.append([T for _, _, T in sorted(zip(columns["x"], columns["y"], columns["f_Temp[0]"]))])
+    assert len(temperatures[0]) > 100 and sum(301.0 < T < 399.0 for T in temperatures[0]) >= 10
+    assert temperatures[0] == pytest.approx(temperatures[1], rel=1e-9)
 
 
 # ------------------------------------------------------------------------------------------------ energy, ranks, restart
