@@ -5,8 +5,8 @@
 #   ln -s DEMPM/src/fix_mpm_couple LIGGGHTS/src/DEMPM    # absolute path of dempm
 #   cd LIGGGHTS/src && make yes-dempm && make mpi
 #
-# LIGGGHTS compiles the fixes itself; the plain C below them (MPM core, RVE engine, conduction of grains) and the VTK writer come from
-# libdempm.a. Without VTK 9 on the machine fix mpm/vtk is left out.
+# LIGGGHTS compiles the fixes itself; the plain C below them (MPM core, RVE engine, conduction of grains) and the
+# VTK writer come from libdempm.a. Without VTK 9 on the machine fix mpm/vtk is left out.
 
 mode=$1
 

@@ -18,7 +18,8 @@
 
 using namespace LAMMPS_NS;
 
-/* What LIGGGHTS' base class reads of a command; the temperature is set afterwards, as all keywords are read in any order. */
+/* What LIGGGHTS' base class reads of a command; the temperature is set afterwards, as all keywords are read in any
+ * order. */
 namespace {
 struct BaseWords {
   char keyword[20] = "initial_temperature", value[2] = "0";
@@ -30,8 +31,8 @@ struct BaseWords {
 FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
     : FixHeatGran(lammps, 5, BaseWords(arg).words), model_(grain_heat_default()), reach_(0.0) {
   KeywordParser parser(lmp, this, narg, arg, 3,
-                       {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach", "layer",
-                        "minimum_gap"});
+                       {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
+                        "layer", "minimum_gap"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe");
@@ -44,8 +45,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
 void FixHeatGranGrain::read_model(KeywordParser &parser) {
   while (parser.next()) {
     if (parser.is("initial_temperature")) T0 = parser.number(NumberRange::any());
-    else if (parser.is("direct"))
-      model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe"});
+    else if (parser.is("direct")) model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe"});
     else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
     else if (parser.is("indirect"))
       model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
@@ -116,10 +116,11 @@ void FixHeatGranGrain::check_skin() {
   if (model_.indirect == GRAIN_INDIRECT_NONE) return;
   reach_ = grain_heat_reach(&model_, find_largest_radius());
   if (neighbor->skin <= reach_)
-    fix_failed(lmp, this,
-               format_text("the skin (command neighbor) is %g, but the indirect model reaches over gaps of %g: allowed is "
-                           "a number > %g; the more, the more seldom lists are built",
-                           neighbor->skin, reach_, reach_));
+    fix_failed(
+        lmp, this,
+        format_text("the skin (command neighbor) is %g, but the indirect model reaches over gaps of %g: allowed is "
+                    "a number > %g; the more, the more seldom lists are built",
+                    neighbor->skin, reach_, reach_));
 }
 
 void FixHeatGranGrain::setup_pre_force(int) {
@@ -132,8 +133,8 @@ void FixHeatGranGrain::pre_force(int vflag) {
   if (neighbor->ago == 0) setup_pre_force(vflag);
 }
 
-/* LIGGGHTS builds the list anew when a grain has moved by half the skin, which is early enough for contacts. Pairs with a
- * gap up to the reach need it once a grain has moved by half of what the skin has beyond the reach. */
+/* LIGGGHTS builds the list anew when a grain has moved by half the skin, which is early enough for contacts. Pairs
+ * with a gap up to the reach need it once a grain has moved by half of what the skin has beyond the reach. */
 void FixHeatGranGrain::post_integrate() {
   const size_t count = 3 * (size_t)atom->nlocal;
   double largest = built_.size() == count ? 0.0 : HUGE_VAL, all;
@@ -145,7 +146,7 @@ void FixHeatGranGrain::post_integrate() {
   if (2.0 * sqrt(all) > neighbor->skin - reach_) next_reneighbor = update->ntimestep;
 }
 
-/* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part. The same bits on both. */
+/* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
 void FixHeatGranGrain::exchange(int i, int j) {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};

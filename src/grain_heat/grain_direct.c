@@ -7,10 +7,12 @@
 #define PI 3.14159265358979323846
 
 /* k0 k1 / (k0 + k1), W/(m K): half the harmonic mean. */
-static double join_conductivities(const double k[2]) { return k[0] > 0.0 && k[1] > 0.0 ? k[0] * k[1] / (k[0] + k[1]) : 0.0; }
+static double join_conductivities(const double k[2]) {
+  return k[0] > 0.0 && k[1] > 0.0 ? k[0] * k[1] / (k[0] + k[1]) : 0.0;
+}
 
-/* Heron: 16 area^2 of the triangle of both centres and a point of the circle. The product (d + (a - b)) (d - (a - b)) keeps
- * its bits when a and b change places. */
+/* Heron: 16 area^2 of the triangle of both centres and a point of the circle. The product (d + (a - b)) (d - (a - b))
+ * keeps its bits when a and b change places. */
 double grain_circle(double a, double b, double d) {
   const double sixteen = (a + b - d) * (a + b + d) * ((d + (a - b)) * (d - (a - b)));
   return sqrt(fmax(sixteen, 0.0)) / (2.0 * d);

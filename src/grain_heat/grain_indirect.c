@@ -6,14 +6,14 @@
 
 #define PI 3.14159265358979323846
 
-/* A pair with the smaller grain (then the worse conductor) first, so that the order of the arguments leaves no trace. */
+/* A pair with the smaller grain (then the worse conductor) first: the order of the arguments leaves no trace. */
 typedef struct Ordered {
   double r1, r2, k1, k2, d; /* r1 <= r2 */
   double height1, height2;  /* of the centres above the plane through the contact circle (the radical plane) */
   double contact, gap;      /* radius of the circle where the fluid begins; gap there: 0 in a contact */
 } Ordered;
 
-/* 0 if the centre of the smaller sphere lies beyond the plane: there is no fluid that paths through both could cross. */
+/* 0 if the centre of the smaller sphere lies beyond the plane: no path through both crosses the fluid. */
 static int order_pair(const GrainPair *pair, Ordered *o) {
   const double *radius = pair->radius, *k = pair->conductivity;
   const int first = radius[0] < radius[1] || (radius[0] == radius[1] && k[0] <= k[1]) ? 0 : 1;
@@ -30,7 +30,7 @@ double grain_face_radius(const GrainPair *pair, double porosity) {
   return 0.56 * 0.5 * (pair->radius[0] + pair->radius[1]) / cbrt(1.0 - porosity);
 }
 
-/* ----------------------------------------------------------------------------------------------------------- Voronoi A */
+/* ----------------------------------------------------------------------------------------------- Voronoi A */
 /* Gauss-Legendre, 16 points, on (-1, 1): the positive half. */
 static const double NODE[8] = {0.09501250983763744018, 0.28160355077925891323, 0.45801677765722738634,
                                0.61787624440264374844, 0.75540440835500303389, 0.86563120238783174388,
@@ -113,7 +113,7 @@ double grain_indirect_voronoi_a(const GrainPair *pair, double face, double fluid
          integrate_paths(&paths, range, -0.5 * range, find_end_scale(&paths, range));
 }
 
-/* ----------------------------------------------------------------------------------------------------------- Voronoi B */
+/* ----------------------------------------------------------------------------------------------- Voronoi B */
 /* atanh(sqrt(z)) / sqrt(z), which is atan(sqrt(-z)) / sqrt(-z) for z < 0 and 1 at 0. */
 static double atanh_ratio(double z) {
   if (fabs(z) < 1e-8) return 1.0 + z / 3.0;
@@ -121,12 +121,12 @@ static double atanh_ratio(double z) {
   return (z > 0.0 ? atanh(root) : atan(root)) / root;
 }
 
-/* With x = distance from centre 1 / d, on the surface that is equally far from both spheres (a hyperboloid with the centres
- * as foci), distance from centre 2 / d = x + e, e = (r2 - r1) / d, and the paths' conductance is
- *   h = pi k_f d (1 - e^2) INTEGRAL dx / (a x^2 - x + b (x + e)^2 - (x + e)),  a, b = (k_f (1/core - 1) / k + 1) d / r
- * from the contact circle to the edge of the face. The denominator has roots, real or not by the sign of L below; the
- * difference of the two antiderivatives is written as one function that is smooth at L = 0. Public codes have half of it
- * for L < 0. Equal radii: table 2, corrected. */
+/* With x = distance from centre 1 / d, on the surface that is equally far from both spheres (a hyperboloid with the
+ * centres as foci), distance from centre 2 / d = x + e, e = (r2 - r1) / d, and the paths' conductance is h = pi k_f d
+ * (1 - e^2) INTEGRAL dx / (a x^2 - x + b (x + e)^2 - (x + e)),  a, b = (k_f (1/core - 1) / k + 1) d / r from the
+ * contact circle to the edge of the face. The denominator has roots, real or not by the sign of L below; the
+ * difference of the two antiderivatives is written as one function that is smooth at L = 0. Public codes have half of
+ * it for L < 0. Equal radii: table 2, corrected. */
 double grain_indirect_voronoi_b(const GrainPair *pair, double face, double fluid, double core) {
   Ordered o;
   if (!order_pair(pair, &o) || face <= o.contact || !(o.k1 > 0.0 && o.k2 > 0.0)) return 0.0;
@@ -145,9 +145,10 @@ double grain_indirect_voronoi_b(const GrainPair *pair, double face, double fluid
   return PI * fluid * o.d * flat * D * atanh_ratio(L * D * D);
 }
 
-/* ----------------------------------------------------------------------------------------------------------- the layer */
+/* ----------------------------------------------------------------------------------------------- the layer */
 /* k_f INTEGRAL 2 pi r dr / max(S, gap(r)) from the contact circle to R_e. Where the gap exceeds S the integral over
- * s = d - gap, the sum of both spheres' heights at r, is rational: 2 pi r dr = pi/2 (c^2 / s^3 - s) ds, c = r1^2 - r2^2. */
+ * s = d - gap, the sum of the spheres' heights at r, is rational: 2 pi r dr = pi/2 (c^2 / s^3 - s) ds with
+ * c = r1^2 - r2^2. */
 static double integrate_gap(const Ordered *o, double s0, double gap0, double s1) {
   const double d = o->d, c = (o->r1 - o->r2) * (o->r1 + o->r2);
   const double logarithm = log1p((s0 - s1) / gap0), same = d * logarithm - (s0 - s1);

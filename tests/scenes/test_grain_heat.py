@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""fix heat/gran/grain: the stock fix heat/gran/conduction, the conductances of doc/fix_heat_gran_grain.md, energy, ranks,
-restart. The conductances themselves are tested in tests/unit/test_grain_heat.c."""
+"""fix heat/gran/grain: the stock fix heat/gran/conduction, the conductances of doc/fix_heat_gran_grain.md, energy,
+ranks, restart. The conductances themselves are tested in tests/unit/test_grain_heat.c."""
 import math
 import random
 
@@ -115,7 +115,7 @@ def heat_of(run):
             for _, frame in (frames[0], frames[-1])]
 
 
-# ------------------------------------------------------------------------------------------------- against stock LIGGGHTS
+# ------------------------------------------------------------------------------------- against stock LIGGGHTS
 PAIR_ROWS = [(1, 0.005, 0.01, 0.01, 0.01, 350.0), (2, 0.004, 0.0189, 0.01, 0.01, 250.0)]
 
 
@@ -137,7 +137,7 @@ def test_liggghts_variant_is_the_stock_fix(scene, dempm, liggghts, tmp_path):
         assert last(ours, "z") == last(stock, "z")
 
 
-# ------------------------------------------------------------------------------------------------------------ two grains
+# ------------------------------------------------------------------------------------------------ two grains
 def circle(a, b, d):
     return math.sqrt(a * a - ((a * a - b * b + d * d) / (2 * d)) ** 2)
 
@@ -186,7 +186,8 @@ def test_heat_crosses_gaps_up_to_the_reach_of_the_model(name, reach, dempm):
 def test_grains_outside_the_group_exchange_no_heat(dempm):
     rows = PAIR_ROWS + [(2, 0.004, 0.0101, 0.0185, 0.01, 100.0)]  # touches the first two
     words = "direct batchelor indirect voronoi_b fluid 0.5"
-    script = two_grains(f"group pair id 1 2\nfix heat pair heat/gran/grain initial_temperature 300 {words}\n", 100, rows)
+    fix = f"group pair id 1 2\nfix heat pair heat/gran/grain initial_temperature 300 {words}\n"
+    script = two_grains(fix, 100, rows)
     run = dempm(script.replace("0.04 0 0.02 0 0.02", "0.04 0 0.03 0 0.02"))
     one, two, outside = last(run, "f_Temp[0]")
     masses = last(run, "mass")
@@ -219,7 +220,7 @@ run 300
     assert temperatures[0] == pytest.approx(temperatures[1], rel=1e-9)
 
 
-# ------------------------------------------------------------------------------------------------ energy, ranks, restart
+# ------------------------------------------------------------------------------------ energy, ranks, restart
 @pytest.mark.parametrize("name", ["none", *INDIRECT])
 def test_energy_is_kept_and_ranks_agree(name, dempm, tmp_path):
     fix = f"fix heat all heat/gran/grain initial_temperature 300 direct pipe {INDIRECT.get(name, '')}\n"

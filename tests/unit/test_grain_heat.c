@@ -10,27 +10,62 @@ static void note(double *worst, double a, double b) {
   if (!(deviation <= *worst)) *worst = deviation;
 }
 
-/* ---------------------------------------------------------------------------------------------------- reference values */
+/* ---------------------------------------------------------------------------------------- reference values */
 /* Fluid 0.026 W/(m K), porosity 0.4, core R/2, minimum gap 2.75e-8 m, layer 0.4 R of the larger grain. Worked out by
  * independent scripts in Python (adaptive quadrature, relative tolerance 1e-10). */
 static const struct Reference {
   GrainPair pair;
   double geometric, hertz, face, batchelor, liggghts, pipe, voronoi_a, voronoi_b, layer;
-} REFERENCES[] = {
-    {{{0.005, 0.005}, {1, 1}, 0.00999}, 0.00022355088906108038, 0.00015811388300841574, 0.003319767084190726,
-     0.00044710177812216077, 0.0007924672683793274, 1.5715825111426247e-05, 0.0009209042257152114, 0.0008164513898832168,
-     0.004952007762152006},
-    {{{0.005, 0.005}, {1, 1}, 0.0102}, 0, 0, 0.003319767084190726, 0, 0, 0, 0.0006625038707453527, 0.0006247555621969719,
-     0.0009389735319616269},
-    {{{0.005, 0.005}, {50, 1}, 0.00995}, 0.000499374608885954, 0.0003535533905932727, 0.003319767084190726,
-     0.001958331799552761, 0.0034710527394680203, 0.00015438657365039968, 0.001143836372469176, 0.0010536706747964156,
-     0.004933022967287505},
-    {{{0.003, 0.006}, {1, 2}, 0.008995}, 0.00014139188492408178, 0.0001000000000000153, 0.0029877903757716535,
-     0.0003770450264642181, 0.0006682949091212755, 1.0473429952447695e-05, 0.0007785831428041266, 0.0007908136068368263,
-     0.003910525300025773},
-    {{{0.00483, 0.00483}, {2000, 2000}, 0.0096117}, 0.0004823958721838265, 0.0003415325753131003, 0.003206895003328241,
-     1.929583488735306, 3.4200976852525935, 0.1521201787492086, 0.003706968424058489, 0.0037067606587983526,
-     0.004751721382302063}};
+} REFERENCES[] = {{{{0.005, 0.005}, {1, 1}, 0.00999},
+                   0.00022355088906108038,
+                   0.00015811388300841574,
+                   0.003319767084190726,
+                   0.00044710177812216077,
+                   0.0007924672683793274,
+                   1.5715825111426247e-05,
+                   0.0009209042257152114,
+                   0.0008164513898832168,
+                   0.004952007762152006},
+                  {{{0.005, 0.005}, {1, 1}, 0.0102},
+                   0,
+                   0,
+                   0.003319767084190726,
+                   0,
+                   0,
+                   0,
+                   0.0006625038707453527,
+                   0.0006247555621969719,
+                   0.0009389735319616269},
+                  {{{0.005, 0.005}, {50, 1}, 0.00995},
+                   0.000499374608885954,
+                   0.0003535533905932727,
+                   0.003319767084190726,
+                   0.001958331799552761,
+                   0.0034710527394680203,
+                   0.00015438657365039968,
+                   0.001143836372469176,
+                   0.0010536706747964156,
+                   0.004933022967287505},
+                  {{{0.003, 0.006}, {1, 2}, 0.008995},
+                   0.00014139188492408178,
+                   0.0001000000000000153,
+                   0.0029877903757716535,
+                   0.0003770450264642181,
+                   0.0006682949091212755,
+                   1.0473429952447695e-05,
+                   0.0007785831428041266,
+                   0.0007908136068368263,
+                   0.003910525300025773},
+                  {{{0.00483, 0.00483}, {2000, 2000}, 0.0096117},
+                   0.0004823958721838265,
+                   0.0003415325753131003,
+                   0.003206895003328241,
+                   1.929583488735306,
+                   3.4200976852525935,
+                   0.1521201787492086,
+                   0.003706968424058489,
+                   0.0037067606587983526,
+                   0.004751721382302063}};
 enum { REFERENCE_COUNT = sizeof REFERENCES / sizeof REFERENCES[0], MODELS = 9 };
 static const char *const MODEL_NAMES[MODELS] = {"geometric", "hertz",     "face",      "batchelor", "liggghts",
                                                 "pipe",      "voronoi_a", "voronoi_b", "layer"};
@@ -50,7 +85,7 @@ static void models_meet_the_reference_values(void **state) {
                                    grain_indirect_voronoi_a(&r->pair, face, 0.026),
                                    grain_indirect_voronoi_b(&r->pair, face, 0.026, 0.5),
                                    grain_indirect_layer(&r->pair, 0.026, 0.4, 2.75e-8)};
-    const double wanted[MODELS] = {r->geometric, r->hertz, r->face,      r->batchelor, r->liggghts,
+    const double wanted[MODELS] = {r->geometric, r->hertz,     r->face,      r->batchelor, r->liggghts,
                                    r->pipe,      r->voronoi_a, r->voronoi_b, r->layer};
     for (int m = 0; m < MODELS; m++) {
       if (wanted[m] == 0.0) assert_true(values[m] == 0.0);
@@ -67,13 +102,33 @@ static void impacts_meet_the_reference_values(void **state) {
   (void)state;
   const struct {
     double radius[2], young, speed, density[2], specific[2], conductivity[2], radius_max, duration, h;
-  } cases[] = {
-      {{0.005, 0.005}, 1e8, 0.1, {2500, 2500}, {800, 800}, {1, 1}, 0.00023375788188955085, 0.000643322262284117,
-       0.00431813449591898},
-      {{0.005, 0.005}, 1e8, 0.1, {2500, 7800}, {800, 460}, {1, 50}, 0.0002539941640866773, 0.0007595275473899475,
-       0.008234940043306275},
-      {{0.001, 0.003}, 5e7, 1.0, {1000, 2500}, {1000, 800}, {0.2, 1}, 0.00015127926280553494, 8.981184081877794e-05,
-       0.002250385280367298}};
+  } cases[] = {{{0.005, 0.005},
+                1e8,
+                0.1,
+                {2500, 2500},
+                {800, 800},
+                {1, 1},
+                0.00023375788188955085,
+                0.000643322262284117,
+                0.00431813449591898},
+               {{0.005, 0.005},
+                1e8,
+                0.1,
+                {2500, 7800},
+                {800, 460},
+                {1, 50},
+                0.0002539941640866773,
+                0.0007595275473899475,
+                0.008234940043306275},
+               {{0.001, 0.003},
+                5e7,
+                1.0,
+                {1000, 2500},
+                {1000, 800},
+                {0.2, 1},
+                0.00015127926280553494,
+                8.981184081877794e-05,
+                0.002250385280367298}};
   double worst = 0.0;
   for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
     GrainPair pair = {.distance = 1.0};
@@ -114,7 +169,7 @@ static void collision_factors_meet_the_table(void **state) {
   AT_MOST(worst, 1e-13);
 }
 
-/* ---------------------------------------------------------------------------------------------------- own quadratures */
+/* ---------------------------------------------------------------------------------------- own quadratures */
 typedef struct Sweep {
   GrainPair pair;
   double face, fluid, core, layer, minimum_gap;
@@ -130,7 +185,8 @@ static long double integrate(Integrand f, const Sweep *sweep, long double a, lon
     const int first = level == 0 ? 0 : 1, stride = level == 0 ? 1 : 2;
     for (int k = first; k * step < 3.4L; k += stride)
       for (int sign = k == 0 ? 1 : -1; sign <= 1; sign += 2) {
-        const long double u = quarter * sinhl(sign * k * step), weight = quarter * coshl(k * step) / (coshl(u) * coshl(u));
+        const long double u = quarter * sinhl(sign * k * step),
+                          weight = quarter * coshl(k * step) / (coshl(u) * coshl(u));
         sum += weight * f(sweep, middle + half * tanhl(u));
       }
     const long double now = sum * step * half;
@@ -165,14 +221,16 @@ static long double voronoi_a_path(const Sweep *s, long double r) {
   const long double h1 = (a * a - b * b + d * d) / (2.0L * d), outer = a * face / hypotl(face, h1);
   const long double cone2 = outer / height(b, outer), b1 = height(a, r), b2 = height(b, r);
   return 2.0L * (long double)PI * r /
-         ((b1 - r * h1 / face) / s->pair.conductivity[0] + (b2 - r / cone2) / s->pair.conductivity[1] + (d - b1 - b2) / s->fluid);
+         ((b1 - r * h1 / face) / s->pair.conductivity[0] + (b2 - r / cone2) / s->pair.conductivity[1] +
+          (d - b1 - b2) / s->fluid);
 }
 
 /* Radial paths through the circle of radius r on the surface that is equally far from both spheres: solid angles by
  * central differences would lose digits, so they are written out: d(omega) = 2 pi sin(theta) d(theta). */
 static long double voronoi_b_path(const Sweep *s, long double r) {
   const long double a = s->pair.radius[0], b = s->pair.radius[1], d = s->pair.distance;
-  const long double major = 0.5L * (b - a), minor2 = 0.25L * d * d - major * major; /* hyperbola u^2/major^2 - r^2/minor^2 */
+  const long double major = 0.5L * (b - a),
+                    minor2 = 0.25L * d * d - major * major; /* hyperbola u^2/major^2 - r^2/minor^2 */
   const long double root = sqrtl(1.0L + r * r / minor2);
   /* Along the axis from the middle: negative, nearer to the smaller sphere's centre. */
   const long double u = -major * root, slope = -major * r / (minor2 * root);
@@ -198,7 +256,8 @@ static double layer_by_quadrature(const Sweep *s) {
   const long double plane = (a * a - outer * outer + d * d) / (2.0L * d), edge = plane <= 0.0L ? a : height(a, plane);
   const long double start = circle_of(&s->pair, d), inner = circle_of(&s->pair, d - s->minimum_gap);
   if (inner >= edge) return integrate_graded(layer_path, s, start, edge);
-  return (inner > start ? integrate_graded(layer_path, s, start, inner) : 0.0) + integrate_graded(layer_path, s, inner, edge);
+  return (inner > start ? integrate_graded(layer_path, s, start, inner) : 0.0) +
+         integrate_graded(layer_path, s, inner, edge);
 }
 
 static double voronoi_by_quadrature(Integrand path, const Sweep *s) {
@@ -216,7 +275,10 @@ static void indirect_models_meet_own_quadratures(void **state) {
   double worst[3] = {0};
   for (int n = 0; n < 4 * 6 * 4 * 2; n++) {
     const double small = ratios[n % 4], mean = 0.5 * (1.0 + small), *k = conductivities[n / 24 % 4];
-    Sweep s = {.pair = {.radius = {small, 1.0}, .conductivity = {k[0], k[1]}}, .fluid = 1.0, .core = 0.5, .layer = 0.4,
+    Sweep s = {.pair = {.radius = {small, 1.0}, .conductivity = {k[0], k[1]}},
+               .fluid = 1.0,
+               .core = 0.5,
+               .layer = 0.4,
                .minimum_gap = 1e-5};
     s.pair.distance = (1.0 + small) + gaps[n / 4 % 6] * fmin(mean, small);
     s.face = grain_face_radius(&s.pair, porosities[n / 96]);
@@ -234,7 +296,7 @@ static void indirect_models_meet_own_quadratures(void **state) {
   for (int m = 0; m < 3; m++) AT_MOST(worst[m], 1e-10);
 }
 
-/* ------------------------------------------------------------------------------------------------- symmetry and limits */
+/* ------------------------------------------------------------------------------------- symmetry and limits */
 static GrainHeat make_model(GrainDirect direct, GrainIndirect indirect, GrainArea area) {
   GrainHeat model = grain_heat_default();
   model.direct = direct, model.indirect = indirect, model.area = area, model.fluid = 0.026;
@@ -247,8 +309,8 @@ static void both_sides_of_a_pair_see_the_same_bits(void **state) {
   uint64_t seed = 3;
   int conducting = 0;
   for (int n = 0; n < 20000; n++) {
-    const GrainHeat model =
-        make_model((GrainDirect)(1 + n % 3), (GrainIndirect)(n / 3 % 4), n & 1 ? GRAIN_AREA_HERTZ : GRAIN_AREA_GEOMETRIC);
+    const GrainHeat model = make_model((GrainDirect)(1 + n % 3), (GrainIndirect)(n / 3 % 4),
+                                       n & 1 ? GRAIN_AREA_HERTZ : GRAIN_AREA_GEOMETRIC);
     const double a = 0.001 + 0.009 * base_random(&seed), b = n % 5 ? 0.001 + 0.009 * base_random(&seed) : a;
     const double ka = base_random(&seed), kb = base_random(&seed), d = (a + b) * (0.8 + 0.4 * base_random(&seed));
     const double one = grain_heat_conductance(&model, &(GrainPair){{a, b}, {ka, kb}, d});
