@@ -41,7 +41,7 @@ double MaterialProperties::of_type(const char *name, const NumberRange &range) c
   FixPropertyGlobal *property = require(name, "peratomtype", "VALUE [one per atom type]");
   if (property->size_vector < type_)
     fix_failed(lmp, fix_,
-               format_text("property '%s' has %d value(s), but the points have atom type %d", name,
+               format_text("property '%s' has %d value(s), but there is atom type %d", name,
                            property->size_vector, type_));
   return checked(name, property->compute_vector(type_ - 1), range);
 }
@@ -50,7 +50,7 @@ double MaterialProperties::of_pair(const char *name, const NumberRange &range) c
   FixPropertyGlobal *property = require(name, "peratomtypepair", "NTYPES VALUE [NTYPES x NTYPES values]");
   if (property->size_array_rows < type_ || property->size_array_cols < type_)
     fix_failed(lmp, fix_,
-               format_text("property '%s' is a %d x %d table, but the points have atom type %d", name,
+               format_text("property '%s' is a %d x %d table, but there is atom type %d", name,
                            property->size_array_rows, property->size_array_cols, type_));
   return checked(name, property->compute_array(type_ - 1, type_ - 1), range);
 }

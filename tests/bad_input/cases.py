@@ -76,8 +76,10 @@ FILES = {
 }
 
 class Case(namedtuple("Case", "name old new style words")):
+    BASE = BASE
+
     def script(self):
-        text = BASE
+        text = self.BASE
         for old, new in zip(*((part,) if isinstance(part, str) else part for part in (self.old, self.new))):
             assert text.count(old) == 1, f"{self.name}: '{old}' must stand once in BASE"
             text = text.replace(old, new)

@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "fix_heat_gran_grain.h"
+
+#include <cmath>
+
+#include "atom.h"
+#include "fix_property_atom.h"
+#include "force.h"
+#include "keyword_parser.h"
+#include "material_properties.h"
+#include "modify.h"
+#include "neigh_list.h"
+#include "neighbor.h"
+#include "pair_gran.h"
+#include "properties.h"
+#include "rank_error.h"
+#include "update.h"
+
+using namespace LAMMPS_NS;
+
+/* What LIGGGHTS' base class reads of a command; the temperature is set afterwards, as all keywords are read in any
+ * order. */
+namespace {
+struct BaseWords {
+  char keyword[20] = "initial_temperature", value[2] = "0";
+  char *words[5];
+  explicit BaseWords(char **arg) : words{arg[0], arg[1], arg[2], keyword, value} {}
+};
+}  // namespace
+
+FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
+    : FixHeatGran(lammps, 5, BaseWords(arg).words), model_(grain_heat_default()), reach_(0.0) {
+  KeywordParser parser(lmp, this, narg, arg, 3,
+                       {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
+                        "layer", "minimum_gap"});
+  read_model(parser);
+  parser.require("initial_temperature", "initial_temperature T");
+  parser.require("direct", "direct none|batchelor|liggghts|pipe");
+  check_keywords(parser);
+  if (grain_heat_check(&model_) != BASE_OK) parser.fail(base_error_message());
+  force_reneighbor = model_.indirect != GRAIN_INDIRECT_NONE;
+  next_reneighbor = -1;
+}
+
+void FixHeatGranGrain::read_model(KeywordParser &parser) {
+  while (parser.next()) {
+    if (parser.is("initial_temperature")) T0 = parser.number(NumberRange::any());
+    else if (parser.is("direct")) model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe"});
+    else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
+    else if (parser.is("indirect"))
+      model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
+    else if (parser.is("fluid")) model_.fluid = parser.number(NumberRange::positive());
+    else if (parser.is("porosity")) model_.porosity = parser.number(NumberRange::inside(0.0, 1.0));
+    else if (parser.is("core")) model_.core = parser.number(NumberRange::inside(0.0, 1.0));
+    else if (parser.is("reach")) model_.reach = parser.number(NumberRange::positive());
+    else if (parser.is("layer")) model_.layer = parser.number(NumberRange::positive());
+    else if (parser.is("minimum_gap")) model_.minimum_gap = parser.number(NumberRange::positive());
+  }
+}
+
+/* A keyword that the model does not use is a mistake in the script. */
+void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
+  const GrainIndirect a = GRAIN_INDIRECT_VORONOI_A, b = GRAIN_INDIRECT_VORONOI_B, layer = GRAIN_INDIRECT_LAYER;
+  const struct {
+    const char *keyword, *models;
+    bool used;
+  } uses[] = {{"area", "'direct batchelor', 'liggghts' or 'pipe'", model_.direct != GRAIN_DIRECT_NONE},
+              {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
+              {"porosity", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
+              {"reach", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
+              {"core", "'indirect voronoi_b'", model_.indirect == b},
+              {"layer", "'indirect layer'", model_.indirect == layer},
+              {"minimum_gap", "'indirect layer'", model_.indirect == layer}};
+  for (const auto &use : uses)
+    if (parser.given(use.keyword) && !use.used)
+      parser.fail(std::string("keyword '") + use.keyword + "' has a meaning with " + use.models + " only");
+  if (model_.indirect != GRAIN_INDIRECT_NONE) parser.require("fluid", "fluid K, the conductivity of the fluid");
+}
+
+int FixHeatGranGrain::setmask() {
+  const int neighbours = model_.indirect == GRAIN_INDIRECT_NONE ? 0 : FixConst::POST_INTEGRATE | FixConst::PRE_FORCE;
+  return FixHeatGran::setmask() | FixConst::POST_FORCE | neighbours;
+}
+
+void FixHeatGranGrain::init() {
+  if (modify->n_fixes_style("heat/gran") > 1)
+    fix_failed(lmp, this, "there is another fix heat/gran or heat/gran/...: each contact would conduct twice");
+  if (force->newton_pair) fix_failed(lmp, this, "'newton off' is needed");
+  const int types = atom->get_properties()->max_type();
+  conductivity_.assign(types + 1, 0.0);
+  for (int type = 1; type <= types; type++) {
+    const MaterialProperties properties(lmp, this, type);
+    conductivity_[type] = properties.of_type("thermalConductivity", NumberRange::at_least(0.0));
+    properties.of_type("thermalCapacity", NumberRange::at_least(0.0));
+  }
+  check_skin();
+  FixHeatGran::init();
+}
+
+/* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
+double FixHeatGranGrain::find_largest_radius() const {
+  double mine = 0.0, all;
+  for (int i = 0; i < atom->nlocal; i++)
+    if (atom->mask[i] & groupbit) mine = fmax(mine, atom->radius[i]);
+  for (int k = 0; k < modify->nfix; k++)
+    for (int type = 1; type < (int)conductivity_.size(); type++)
+      if (modify->fix[k]->use_rad_for_cut_neigh_and_ghost()) mine = fmax(mine, modify->fix[k]->max_rad(type));
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
+  return all;
+}
+
+/* The neighbour list holds pairs whose gap was below the skin when it was built. `neigh_modify contact_distance_factor`
+ * would be another way to more distant pairs, but with it LIGGGHTS' walls of a given temperature take the root of a
+ * negative contact area wherever there is a gap, and the temperatures become not-a-number. */
+void FixHeatGranGrain::check_skin() {
+  if (model_.indirect == GRAIN_INDIRECT_NONE) return;
+  reach_ = grain_heat_reach(&model_, find_largest_radius());
+  if (neighbor->skin <= reach_)
+    fix_failed(
+        lmp, this,
+        format_text("the skin (command neighbor) is %g, but the indirect model reaches over gaps of %g: allowed is "
+                    "a number > %g; the more, the more seldom lists are built",
+                    neighbor->skin, reach_, reach_));
+}
+
+void FixHeatGranGrain::setup_pre_force(int) {
+  if (model_.indirect == GRAIN_INDIRECT_NONE) return;
+  built_.resize(3 * (size_t)atom->nlocal);
+  for (size_t k = 0; k < built_.size(); k++) built_[k] = atom->x[k / 3][k % 3];
+}
+
+void FixHeatGranGrain::pre_force(int vflag) {
+  if (neighbor->ago == 0) setup_pre_force(vflag);
+}
+
+/* LIGGGHTS builds the list anew when a grain has moved by half the skin, which is early enough for contacts. Pairs
+ * with a gap up to the reach need it once a grain has moved by half of what the skin has beyond the reach. */
+void FixHeatGranGrain::post_integrate() {
+  const size_t count = 3 * (size_t)atom->nlocal;
+  double largest = built_.size() == count ? 0.0 : HUGE_VAL, all;
+  for (size_t k = 0; k + 2 < count && k + 2 < built_.size(); k += 3) {
+    const double *x = atom->x[k / 3], move[3] = {x[0] - built_[k], x[1] - built_[k + 1], x[2] - built_[k + 2]};
+    largest = fmax(largest, move[0] * move[0] + move[1] * move[1] + move[2] * move[2]);
+  }
+  MPI_Allreduce(&largest, &all, 1, MPI_DOUBLE, MPI_MAX, world);
+  if (2.0 * sqrt(all) > neighbor->skin - reach_) next_reneighbor = update->ntimestep;
+}
+
+/* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
+void FixHeatGranGrain::exchange(int i, int j) {
+  double **x = atom->x;
+  const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+  const int *type = atom->type;
+  const GrainPair pair = {{atom->radius[i], atom->radius[j]},
+                          {conductivity_[type[i]], conductivity_[type[j]]},
+                          sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
+  const double conductance = grain_heat_conductance(&model_, &pair);
+  if (conductance == 0.0) return;
+  const double flow = (Temp[j] - Temp[i]) * conductance;
+  heatFlux[i] += flow;
+  if (j < atom->nlocal) heatFlux[j] -= flow;
+  for (int a = 0; a < 3; a++) {
+    directionalHeatFlux[i][a] += 0.5 * flow * branch[a];
+    if (j < atom->nlocal) directionalHeatFlux[j][a] += 0.5 * flow * branch[a];
+  }
+}
+
+void FixHeatGranGrain::post_force(int) {
+  updatePtrs();
+  const NeighList *list = pair_gran->list;
+  for (int n = 0; n < list->inum; n++) {
+    const int i = list->ilist[n];
+    for (int k = 0; k < list->numneigh[i]; k++) {
+      const int j = list->firstneigh[i][k] & NEIGHMASK;
+      if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j);
+    }
+  }
+}

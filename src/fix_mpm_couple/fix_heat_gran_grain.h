@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* clang-format off: the style's name is made a string as it stands */
+#ifdef FIX_CLASS
+
+FixStyle(heat/gran/grain,FixHeatGranGrain)
+
+/* clang-format on */
+#else
+
+#ifndef LMP_FIX_HEAT_GRAN_GRAIN_H
+#define LMP_FIX_HEAT_GRAN_GRAIN_H
+
+#include <vector>
+
+#include "../grain_heat/grain_heat.h"
+#include "fix_heat_gran.h"
+
+namespace LAMMPS_NS {
+
+/* Heat conduction between the particles of a group (pair_style gran), in place of LIGGGHTS' fix heat/gran/conduction.
+ *
+ *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe
+ *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
+ *       [layer F] [minimum_gap S]
+ *
+ * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that integrates
+ * Temp, and the scalar f_ID: sum of m c T, J. */
+class FixHeatGranGrain : public FixHeatGran {
+ public:
+  FixHeatGranGrain(class LAMMPS *, int, char **);
+  int setmask();
+  void init();
+  void setup_pre_force(int);
+  void post_integrate();
+  void pre_force(int);
+  void post_force(int);
+
+ private:
+  GrainHeat model_;
+  std::vector<double> conductivity_; /* by atom type; [0] is unused */
+  double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
+  std::vector<double> built_;        /* positions when the neighbour list was built */
+
+  void read_model(class KeywordParser &);
+  void check_keywords(const class KeywordParser &) const;
+  double find_largest_radius() const;
+  void check_skin();
+  void exchange(int i, int j);
+};
+
+}  // namespace LAMMPS_NS
+
+#endif
+#endif

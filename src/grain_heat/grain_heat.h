@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* Heat conduction between two spherical grains: conductances h of a pair in W/K, heat into grain 0 = h (T1 - T0) in W.
+ *
+ * Sources: tables 1 (direct: through the contact) and 2 (indirect: through the fluid around it) of R. Rangel, A.
+ * Franci, A. Cornejo, E. Onate, F. Zarate, "Thermo-mechanical analysis of continuous and discrete media with PFEM and
+ * DEM". "Corrected" marks formulas that are wrong as printed there; doc/fix_heat_gran_grain.md says how. SI units.
+ *
+ * All functions give the same bits when the two grains change places: heat is then neither made nor lost, although two
+ * ranks may each work out one side of a pair. */
+#ifndef DEMPM_GRAIN_HEAT_H
+#define DEMPM_GRAIN_HEAT_H
+
+#include "../base/base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Two grains. Radii and distance of the centres (> 0) in m, conductivities (>= 0) in W/(m K). A conductivity of 0 lets
+ * no heat through: h = 0 but for the surrounding layer, which the grains' conductivities do not enter. */
+typedef struct GrainPair {
+  double radius[2], conductivity[2];
+  double distance;
+} GrainPair;
+
+/* ------------------------------------------------------------------------------------------ contact radius */
+/* Radius of the circle in which the spheres meet, m; 0 if they do not overlap. A sphere whose centre lies deeper in the
+ * other than that circle (distance below the larger radius) counts with its own radius, as in LIGGGHTS. */
+double grain_radius_geometric(const GrainPair *pair);
+/* Hertz: sqrt(R* overlap), 1/R* = 1/R0 + 1/R1, m. About 1/sqrt(2) of the geometric one for a small overlap. */
+double grain_radius_hertz(const GrainPair *pair);
+
+/* -------------------------------------------------------------------------------------------------- direct */
+/* Batchelor and O'Brien (table 1): 4 k Rc, k = k0 k1 / (k0 + k1). */
+double grain_direct_batchelor(const GrainPair *pair, double contact_radius);
+/* What LIGGGHTS' fix heat/gran/conduction has: 4 k sqrt(A), A = pi Rc^2; sqrt(pi) times the above. */
+double grain_direct_liggghts(const GrainPair *pair, double contact_radius);
+/* Thermal pipe (table 1): pi Rc^2 k / d, k = (R0 + R1) / (R0/k0 + R1/k1). */
+double grain_direct_pipe(const GrainPair *pair, double contact_radius);
+
+/* An impact: largest contact radius, m, and duration, s. */
+typedef struct GrainImpact {
+  double radius_max, duration;
+  double heat_capacity[2]; /* density times specific heat, J/(m3 K) */
+} GrainImpact;
+/* Elastic Hertz impact (not printed; corrected against public codes): masses kg, stiffness
+ * 1/E* = (1 - nu0^2)/E0 + (1 - nu1^2)/E1 in Pa, speed of approach m/s, all > 0. */
+void grain_impact_hertz(const GrainPair *pair, const double mass[2], double stiffness, double speed, double *radius_max,
+                        double *duration);
+/* Collisional (table 1, corrected: C2 = ... + 24.885, the ratio of heat capacities not squared and at most 1): mean
+ * over the impact. The published fit; accurate to some per cent for Fourier numbers below 0.1 only. */
+double grain_direct_collisional(const GrainPair *pair, const GrainImpact *impact);
+
+/* ------------------------------------------------------------------------------------------------ indirect */
+/* Radius of the Voronoi face between two grains in a packing of the given porosity: 0.56 Rmean (1 - porosity)^(-1/3), m
+ * (Yang et al. 2002). */
+double grain_face_radius(const GrainPair *pair, double porosity);
+/* Voronoi A (table 2, corrected: r_sf with a plus sign), paths parallel to the line of centres within the cone over a
+ * face of radius `face`; for unequal radii each grain has its own height and cone (Gan, Zhou, Yu 2016). 0 if the
+ * contact is larger than the face. `fluid`: conductivity, W/(m K). Quadrature with a relative error below 1e-10. */
+double grain_indirect_voronoi_a(const GrainPair *pair, double face, double fluid);
+/* Voronoi B (table 2, corrected: the listed angles are cosines), radial paths from isothermal cores of radius core * R,
+ * 0 < core < 1, to the surface that is equally far from both grains. Closed form, also for unequal radii. */
+double grain_indirect_voronoi_b(const GrainPair *pair, double face, double fluid, double core);
+/* Surrounding layer (table 2, corrected: factor k_f; R_e at most the smaller radius): the larger grain carries a layer
+ * of fluid of thickness layer * R; minimum_gap > 0, m, bounds the length of a path from below. Closed form. */
+double grain_indirect_layer(const GrainPair *pair, double fluid, double layer, double minimum_gap);
+
+/* --------------------------------------------------------------------------------------------------- model */
+typedef enum GrainArea { GRAIN_AREA_GEOMETRIC, GRAIN_AREA_HERTZ } GrainArea;
+typedef enum GrainDirect {
+  GRAIN_DIRECT_NONE,
+  GRAIN_DIRECT_BATCHELOR,
+  GRAIN_DIRECT_LIGGGHTS,
+  GRAIN_DIRECT_PIPE
+} GrainDirect;
+typedef enum GrainIndirect {
+  GRAIN_INDIRECT_NONE,
+  GRAIN_INDIRECT_VORONOI_A,
+  GRAIN_INDIRECT_VORONOI_B,
+  GRAIN_INDIRECT_LAYER
+} GrainIndirect;
+
+/* One direct and one indirect model; their conductances add. */
+typedef struct GrainHeat {
+  GrainArea area; /* of the direct model; indirect paths begin at the geometric contact radius, where the fluid does */
+  GrainDirect direct;
+  GrainIndirect indirect;
+  double fluid;       /* conductivity, W/(m K) */
+  double porosity;    /* Voronoi */
+  double core;        /* Voronoi B */
+  double layer;       /* in radii of the larger grain */
+  double minimum_gap; /* layer, m */
+  double reach;       /* Voronoi: largest gap between surfaces, in mean radii of the pair */
+} GrainHeat;
+
+/* Nothing conducts; porosity 0.4, core 0.5, layer 0.4, minimum_gap 2.75e-8 m, reach 0.5; no fluid. */
+GrainHeat grain_heat_default(void);
+BaseStatus grain_heat_check(const GrainHeat *model);
+/* h of a pair, W/K. */
+double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
+/* Smallest gap between surfaces, m, from which on h = 0 for every pair of grains no larger than `radius`; 0 without an
+ * indirect model. */
+double grain_heat_reach(const GrainHeat *model, double radius);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Wrong scripts for fix heat/gran/grain; see cases.py."""
+from cases import Case
+
+HEAT_BASE = """\
+atom_style      granular
+atom_modify     map array
+units           si
+newton          off
+communicate     single vel yes
+boundary        f f f
+region          box block 0 0.04 0 0.02 0 0.02 units box
+create_box      1 box
+create_atoms    1 single 0.01 0.01 0.01 units box
+create_atoms    1 single 0.0195 0.01 0.01 units box
+set             group all diameter 0.01 density 2500
+neighbor        0.003 bin
+fix m1 all property/global youngsModulus peratomtype 5e6
+fix m2 all property/global poissonsRatio peratomtype 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5
+fix m4 all property/global coefficientFriction peratomtypepair 1 0.5
+fix k  all property/global thermalConductivity peratomtype 20
+fix c  all property/global thermalCapacity peratomtype 100
+pair_style      gran model hertz tangential history
+pair_coeff      * *
+timestep        1e-5
+fix heat all heat/gran/grain initial_temperature 300 direct pipe area hertz &
+  indirect voronoi_b fluid 0.026 porosity 0.4 core 0.5 reach 0.5
+run             2
+"""
+LAYER = "indirect layer fluid 0.026 layer 0.4 minimum_gap 1e-6"
+VORONOI = "indirect voronoi_b fluid 0.026 porosity 0.4 core 0.5 reach 0.5"
+
+
+class HeatCase(Case):
+    BASE = HEAT_BASE
+
+
+def heat(name, old, new, *words):
+    return HeatCase("heat_" + name, old, new, "heat/gran/grain", words)
+
+
+HEAT_CASES = [
+    heat("unknown_keyword", "core 0.5", "kernel 0.5", "'kernel'", "allowed are", "core"),
+    heat("twice", "core 0.5", "core 0.5 core 0.4", "'core'", "twice"),
+    heat("no_temperature", "initial_temperature 300 ", "", "'initial_temperature'", "missing"),
+    heat("temperature_nan", "temperature 300", "temperature nan", "'initial_temperature'", "'nan'", "finite"),
+    heat("no_direct", "direct pipe area hertz ", "", "'direct'", "missing", "batchelor"),
+    heat("wrong_direct", "direct pipe", "direct collisional", "'direct'", "'collisional'",
+         "batchelor, liggghts or pipe"),
+    heat("wrong_indirect", "indirect voronoi_b", "indirect voronoi", "'indirect'", "'voronoi'", "voronoi_a"),
+    heat("wrong_area", "area hertz", "area 0.001", "'area'", "'0.001'", "geometric or hertz"),
+    heat("area_without_direct", "direct pipe", "direct none", "'area'", "'direct batchelor'"),
+    heat("nothing", ("direct pipe area hertz", VORONOI), ("direct none", ""), "nothing conducts"),
+    heat("no_fluid", "fluid 0.026 ", "", "'fluid'", "missing"),
+    heat("fluid_zero", "fluid 0.026", "fluid 0", "'fluid'", "'0'", "> 0"),
+    heat("fluid_without_indirect", VORONOI, "fluid 0.026", "'fluid'", "'indirect voronoi_a'"),
+    heat("porosity_one", "porosity 0.4", "porosity 1", "'porosity'", "'1'", "> 0 and < 1"),
+    heat("core_zero", "core 0.5", "core 0", "'core'", "'0'", "> 0 and < 1"),
+    heat("core_for_voronoi_a", "voronoi_b", "voronoi_a", "'core'", "'indirect voronoi_b'"),
+    heat("minimum_gap_zero", VORONOI, LAYER.replace("1e-6", "0"), "'minimum_gap'", "'0'", "> 0"),
+    heat("layer_for_voronoi", "core 0.5", "layer 0.5", "'layer'", "'indirect layer'"),
+    heat("skin", "neighbor        0.003", "neighbor        0.0025", "skin", "0.0025", "neighbor"),
+    heat("skin_layer", ("neighbor        0.003", VORONOI), ("neighbor        0.002", LAYER), "skin", "0.002",
+         "> 0.002"),
+    heat("no_conductivity", "fix k  all property/global thermalConductivity peratomtype 20\n", "",
+         "'thermalConductivity'", "missing", "property/global"),
+    heat("negative_conductivity", "thermalConductivity peratomtype 20", "thermalConductivity peratomtype -20",
+         "'thermalConductivity'", "-20", ">= 0"),
+    heat("no_capacity", "fix c  all property/global thermalCapacity peratomtype 100\n", "", "'thermalCapacity'",
+         "missing"),
+    heat("another", "run             2", "fix too all heat/gran/conduction initial_temperature 300\nrun 2",
+         "another fix"),
+    heat("twice_the_fix", "run             2", "fix too all heat/gran/grain initial_temperature 300 direct pipe\nrun 2",
+         "another fix"),
+]

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""fix heat/gran/grain: the stock fix heat/gran/conduction, the conductances of doc/fix_heat_gran_grain.md, energy,
+ranks, restart. The conductances themselves are tested in tests/unit/test_grain_heat.c."""
+import math
+import random
+
+import pytest
+from test_with_grains import GRAINS, PAIR, POINTS
+
+HEAD = """
+atom_style granular
+atom_modify map array
+units si
+newton off
+communicate single vel yes
+boundary {boundary}
+"""
+PROPERTIES = """
+neighbor {skin} bin
+neigh_modify delay 0
+fix m1 all property/global youngsModulus peratomtype 5e6 5e6
+fix m2 all property/global poissonsRatio peratomtype 0.3 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 2 0.5 0.5 0.5 0.5
+fix m4 all property/global coefficientFriction peratomtypepair 2 0.5 0.5 0.5 0.5
+fix k all property/global thermalConductivity peratomtype 20 90
+fix c all property/global thermalCapacity peratomtype 0.1 0.2
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 2e-5
+"""
+OUTPUT = """
+thermo 1000
+thermo_style custom step atoms f_heat
+thermo_modify format float %.17g
+dump end all custom {every} end.dump id type radius mass x y z f_Temp[0] f_heatFlux[0]
+dump_modify end sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g"
+"""
+
+
+def properties(fix, skin=None):
+    """Indirect conduction needs a skin above its reach, here at most half a radius of 0.006 m."""
+    return PROPERTIES.format(skin=skin or (0.0035 if "indirect" in fix else 0.001))
+
+
+STOCK = "fix heat all heat/gran/conduction initial_temperature 300\n"
+OURS = "fix heat all heat/gran/grain initial_temperature 300 direct liggghts\n"
+INDIRECT = {
+    "voronoi_a": "indirect voronoi_a fluid 0.5 porosity 0.4",
+    "voronoi_b": "indirect voronoi_b fluid 0.5 porosity 0.4 core 0.5",
+    "layer": "indirect layer fluid 0.5 layer 0.4 minimum_gap 1e-6",
+}
+
+
+def box(low, high, boundary="p p f"):
+    bounds = " ".join(f"{a} {b}" for a, b in zip(low, high))
+    return HEAD.format(boundary=boundary) + f"region box block {bounds} units box\ncreate_box 2 box\n"
+
+
+def grains(rows):
+    """rows: (type, radius, x, y, z, temperature). LIGGGHTS wants a run before it sets a property."""
+    make = "".join(f"create_atoms {t} single {x!r} {y!r} {z!r} units box\n" for t, _, x, y, z, _ in rows)
+    size = "".join(f"set atom {n} diameter {2 * row[1]!r} density 2500\n" for n, row in enumerate(rows, 1))
+    heat = "run 0\n" + "".join(f"set atom {n} property/atom Temp {row[5]!r}\n" for n, row in enumerate(rows, 1))
+    return make + size, heat
+
+
+def packing(spacing, jitter, count=(5, 5, 4)):
+    """A box of grains of two sizes and types around the points of a lattice, temperatures from 200 to 400."""
+    draw = random.Random(7).uniform
+    rows = []
+    for n in range(math.prod(count)):
+        cell = (n % count[0], n // count[0] % count[1], n // (count[0] * count[1]))
+        x, y, z = ((k + 0.5) * spacing + draw(-jitter, jitter) for k in cell)
+        rows.append((1 + n % 2, draw(0.004, 0.006), x, y, z, draw(200.0, 400.0)))
+    return rows, [k * spacing for k in count]
+
+
+def still(fix, steps, every=None):
+    """Grains that overlap and do not move: there is no integrator."""
+    rows, size = packing(0.0099, 0.0005)
+    make, heat = grains(rows)
+    return (box((0, 0, 0), size) + make + properties(fix) + fix + heat + OUTPUT.format(every=every or steps) +
+            f"run {steps}\n")
+
+
+def falling(fix, steps, skin=None):
+    """Loose grains that fall on a hot floor."""
+    rows, size = packing(0.013, 0.0005)
+    make, heat = grains(rows)
+    floor = """
+fix g all gravity 9.81 vector 0 0 -1
+fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.0 temperature 500
+fix move all nve/sphere
+"""
+    return (box((0, 0, -0.001), (size[0], size[1], 0.1)) + make + properties(fix, skin) + fix + floor + heat +
+            OUTPUT.format(every=steps) + f"run {steps}\n")
+
+
+def last(run, name):
+    step, columns = run.dump("end.dump")[-1]
+    return columns[name]
+
+
+def deviation(run, other, name="f_Temp[0]"):
+    mine, theirs = last(run, name), last(other, name)
+    assert len(mine) == len(theirs) > 1
+    return max(abs(a - b) for a, b in zip(mine, theirs)) / max(abs(b) for b in theirs)
+
+
+def heat_of(run):
+    """Sum of m c T of the first and the last frame of the dump."""
+    frames = run.dump("end.dump")
+    return [math.fsum(m * (0.1, 0.2)[int(t) - 1] * T
+                      for m, t, T in zip(frame["mass"], frame["type"], frame["f_Temp[0]"]))
+            for _, frame in (frames[0], frames[-1])]
+
+
+# ------------------------------------------------------------------------------------- against stock LIGGGHTS
+PAIR_ROWS = [(1, 0.005, 0.01, 0.01, 0.01, 350.0), (2, 0.004, 0.0189, 0.01, 0.01, 250.0)]
+
+
+def two_grains(fix, steps, rows=PAIR_ROWS):
+    make, heat = grains(rows)
+    return (box((0, 0, 0), (0.04, 0.02, 0.02), "f f f") + make + properties(fix) + fix + heat +
+            OUTPUT.format(every=steps) + f"run {steps}\n")
+
+
+@pytest.mark.parametrize("scene", [two_grains, still, falling])
+def test_liggghts_variant_is_the_stock_fix(scene, dempm, liggghts, tmp_path):
+    ours = dempm(scene(OURS, 10000), cwd=tmp_path / "ours")
+    stock = liggghts(scene(STOCK, 10000), cwd=tmp_path / "stock")
+    before = [row[5] for row in (PAIR_ROWS if scene is two_grains else packing(1, 0)[0])]
+    changed = max(abs(a - b) for a, b in zip(last(stock, "f_Temp[0]"), before))
+    assert changed > 10.0
+    assert deviation(ours, stock) < 1e-10
+    if scene is falling:
+        assert last(ours, "z") == last(stock, "z")
+
+
+# ------------------------------------------------------------------------------------------------ two grains
+def circle(a, b, d):
+    return math.sqrt(a * a - ((a * a - b * b + d * d) / (2 * d)) ** 2)
+
+
+@pytest.mark.parametrize("words, conductance", [
+    ("direct batchelor", lambda a, b, d: 4 * 20 * 90 / 110 * circle(a, b, d)),
+    ("direct batchelor area hertz", lambda a, b, d: 4 * 20 * 90 / 110 * math.sqrt(a * b / (a + b) * (a + b - d))),
+    ("direct liggghts", lambda a, b, d: 4 * 20 * 90 / 110 * math.sqrt(math.pi) * circle(a, b, d)),
+    ("direct pipe", lambda a, b, d: math.pi * circle(a, b, d) ** 2 * (a + b) / (a / 20 + b / 90) / d),
+], ids=["batchelor", "hertz", "liggghts", "pipe"])
+def test_flow_between_two_grains(words, conductance, dempm):
+    run = dempm(two_grains(f"fix heat all heat/gran/grain initial_temperature 300 {words}\n", 1))
+    flow = conductance(0.005, 0.004, 0.0089) * (250.0 - 350.0)
+    assert last(run, "f_heatFlux[0]") == pytest.approx([flow, -flow], rel=1e-10)
+
+
+def test_temperatures_decay_exponentially(dempm):
+    """The difference of two grains' temperatures is multiplied by 1 - h dt (1/C1 + 1/C2) in each step."""
+    steps = 200
+    run = dempm(two_grains("fix heat all heat/gran/grain initial_temperature 300 direct batchelor\n", steps))
+    h = 4 * 20 * 90 / 110 * circle(0.005, 0.004, 0.0089)
+    capacity = [c * m for c, m in zip((0.1, 0.2), last(run, "mass"))]
+    factor = 1 - h * 2e-5 * (1 / capacity[0] + 1 / capacity[1])
+    one, two = last(run, "f_Temp[0]")
+    assert 0.01 < factor ** steps < 0.9
+    assert one - two == pytest.approx(100.0 * factor ** steps, rel=1e-9)
+
+
+def flow_over_gap(dempm, words, gap):
+    rows = [PAIR_ROWS[0], (2, 0.004, 0.019 + gap, 0.01, 0.01, 250.0)]
+    run = dempm(two_grains(f"fix heat all heat/gran/grain initial_temperature 300 direct batchelor {words}\n", 1, rows))
+    one, two = last(run, "f_heatFlux[0]")
+    assert one == -two
+    return one
+
+
+@pytest.mark.parametrize("name, reach", [("voronoi_a", 0.5 * 0.0045), ("voronoi_b", 0.5 * 0.0045),
+                                         ("layer", 0.4 * 0.005)])
+def test_heat_crosses_gaps_up_to_the_reach_of_the_model(name, reach, dempm):
+    assert flow_over_gap(dempm, "", 1e-5) == 0.0
+    near, far = (flow_over_gap(dempm, INDIRECT[name], gap) for gap in (1e-5, 0.99 * reach))
+    assert near < far < 0.0
+    assert flow_over_gap(dempm, INDIRECT[name], 1.01 * reach) == 0.0
+
+
+def test_grains_outside_the_group_exchange_no_heat(dempm):
+    rows = PAIR_ROWS + [(2, 0.004, 0.0101, 0.0185, 0.01, 100.0)]  # touches the first two
+    words = "direct batchelor indirect voronoi_b fluid 0.5"
+    fix = f"group pair id 1 2\nfix heat pair heat/gran/grain initial_temperature 300 {words}\n"
+    script = two_grains(fix, 100, rows)
+    run = dempm(script.replace("0.04 0 0.02 0 0.02", "0.04 0 0.03 0 0.02"))
+    one, two, outside = last(run, "f_Temp[0]")
+    masses = last(run, "mass")
+    assert outside == 100.0 and 250.0 < two < one < two + 50.0
+    assert 0.1 * masses[0] * (one - 350.0) == pytest.approx(-0.2 * masses[1] * (two - 250.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("np", [1, 2])
+def test_material_points_do_not_disturb_the_heat_of_grains(np, dempm, tmp_path):
+    """Points lie among the grains; theirs are other temperatures, and radii above the skin."""
+    heat = """
+fix k all property/global thermalConductivity peratomtype 20 90
+fix c all property/global thermalCapacity peratomtype 0.002 0.002
+fix heat grains heat/gran/grain initial_temperature 300 direct pipe indirect voronoi_b fluid 1 reach 0.5
+run 0
+region left block INF 0.9 INF INF INF INF units box
+group left region left
+group hot intersect left grains
+set group hot property/atom Temp 400
+dump end grains custom 300 end.dump x y f_Temp[0]
+dump_modify end format "%.17g %.17g %.17g"
+run 300
+"""
+    temperatures = []
+    for name, points in (("both", POINTS), ("grains", "")):
+        run = dempm(PAIR + GRAINS + points + heat, np=np, cwd=tmp_path / name)
+        columns = run.dump("end.dump")[-1][1]
+        temperatures.append([T for _, _, T in sorted(zip(columns["x"], columns["y"], columns["f_Temp[0]"]))])
+    assert len(temperatures[0]) > 100 and sum(301.0 < T < 399.0 for T in temperatures[0]) >= 10
+    assert temperatures[0] == pytest.approx(temperatures[1], rel=1e-9)
+
+
+# ------------------------------------------------------------------------------------ energy, ranks, restart
+@pytest.mark.parametrize("name", ["none", *INDIRECT])
+def test_energy_is_kept_and_ranks_agree(name, dempm, tmp_path):
+    fix = f"fix heat all heat/gran/grain initial_temperature 300 direct pipe {INDIRECT.get(name, '')}\n"
+    one, two = (dempm(still(fix, 2000), np=np, cwd=tmp_path / str(np)) for np in (1, 2))
+    for run in (one, two):
+        start, end = heat_of(run)
+        assert end == pytest.approx(start, rel=1e-13)
+        assert run.table["f_heat"][-1] == pytest.approx(end, rel=1e-13)
+        temperatures = last(run, "f_Temp[0]")
+        assert max(temperatures) - min(temperatures) < 180.0  # of 200: heat has moved
+    assert deviation(two, one) < 1e-13
+
+
+def test_two_ranks_agree_on_falling_grains(dempm, tmp_path):
+    fix = f"fix heat all heat/gran/grain initial_temperature 300 direct batchelor {INDIRECT['layer']}\n"
+    one, two = (dempm(falling(fix, 2000), np=np, cwd=tmp_path / str(np)) for np in (1, 2))
+    assert deviation(two, one) < 1e-10
+
+
+def test_no_pair_is_missed_while_grains_move(dempm, tmp_path):
+    """Lists are built when they must be: a skin just above the reach gives what a large one gives."""
+    fix = f"fix heat all heat/gran/grain initial_temperature 300 direct batchelor {INDIRECT['layer']}\n"
+    runs = [dempm(falling(fix, 1000, skin), cwd=tmp_path / str(skin)) for skin in (0.00245, 0.006)]
+    assert deviation(*runs) < 1e-10
+
+
+@pytest.mark.parametrize("before, after", [(1, 1), (1, 2), (2, 1)])
+def test_restart_continues(before, after, dempm, tmp_path):
+    fix = f"fix heat all heat/gran/grain initial_temperature 300 direct batchelor {INDIRECT['voronoi_b']}\n"
+    script = still(fix, 200).replace("run 200\n", "run 200\nwrite_restart half\nrun 200\n")
+    through = dempm(script, np=before, cwd=tmp_path / "through")
+    again = dempm(HEAD.format(boundary="p p f") + f"read_restart {tmp_path}/through/half\n" + properties(fix) + fix +
+                  OUTPUT.format(every=200) + "run 200\n", np=after, cwd=tmp_path / "again")
+    assert deviation(again, through) < (1e-15 if before == after else 1e-13)
