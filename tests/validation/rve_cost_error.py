@@ -163,7 +163,9 @@ def study(quick, in_all, resume):
     mixed = run("mixed", words=[*local, "--set", "precision=mixed"])
     for name, words in {} if quick else names.items():
         by_damping[name][4e-3] = run(f"{name.replace(' ', '_')}_4e-3", words=words, number=4e-3)
-    by_damping[f"local {LOCAL}"] = {NUMBER: by_size[GRAINS], **({} if quick else {4e-3: slow_base({4e-3: by_number[4e-3]}, by_size[GRAINS])})}
+    by_damping[f"local {LOCAL}"] = {NUMBER: by_size[GRAINS]}
+    if not quick:
+        by_damping[f"local {LOCAL}"][4e-3] = slow_base({4e-3: by_number[4e-3]}, by_size[GRAINS])
     steps = by_size[GRAINS][0][:, 2].mean() / 200
     by_calls = {n: run(f"calls_{n}", words=[*local, "--set", f"substeps={n}", "--every", round(steps / n)], small=None)
                 for n in ([7] if quick else [1, 3, 7, 22])}
@@ -226,6 +228,10 @@ def seconds_axis(axis):
     axis.set_xlim(low / 1.15, high * 1.1)
 
 
+def head(axis, place, text):
+    axis.annotate(text, (place, 1.0), xycoords=("data", "axes fraction"), ha="center", va="top", color="0.4")
+
+
 def picture(file, by_size, reference, top, by_number, by_damping, mixed, peak):
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9})
     figure, axes = plt.subplots(2, 2, figsize=(9.5, 7.2), constrained_layout=True)
@@ -243,7 +249,7 @@ def picture(file, by_size, reference, top, by_number, by_damping, mixed, peak):
     for axis in axes[0]:
         seconds_axis(axis)
         for (grains, x) in zip(by_size, seconds):
-            axis.annotate(f"N = {grains}" if grains == min(by_size) else f"{grains}", (x, 1.0), xycoords=("data", "axes fraction"), ha="center", va="top", color="0.4")
+            head(axis, x, f"N = {grains}" if grains == min(by_size) else f"{grains}")
     guide = np.array([seconds[0], seconds[-1]])
     axes[0, 0].plot(guide, 30 * np.sqrt(50 / np.array([min(by_size), max(by_size)])), "--", color="0.5", lw=1,
                     label=r"$\propto$ grains$^{-1/2}$")
@@ -262,7 +268,7 @@ def picture(file, by_size, reference, top, by_number, by_damping, mixed, peak):
                                 [100 * found[name][1] for found in changes.values()], color=COLOURS[name], marker=MARKS[name],
                                 ms=4, lw=1, capsize=2)
     for number, place in zip(changes, x):
-        axes[1, 0].annotate(f"I = {number:g}" if number == max(by_number) else f"{number:g}", (place, 1.0), xycoords=("data", "axes fraction"), ha="center", va="top", color="0.4")
+        head(axes[1, 0], place, f"I = {number:g}" if number == max(by_number) else f"{number:g}")
     axes[1, 0].axhline(0, color="0.3", lw=0.8)
     seconds_axis(axes[1, 0])
     axes[1, 0].set(ylabel=f"change against I = {min(by_number):g} (modulus {SLOW:g}), %")
