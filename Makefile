@@ -223,7 +223,7 @@ help:
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
 	@echo "make validate     the figures of doc/validation.md; also against LAMMPS and YADE where they are installed"
-	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 15 minutes; QUICK=1: half a minute"
+	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"

@@ -9,7 +9,7 @@ Sizes: every size gets as many packings (seeds) as make N grains in all (51,200)
 packings minus the reference's: it stays in a scene of many material points, which average the scatter of single packings.
 Rates, damping, precision and calls: the same packings of 400 grains each time, the change against the first of the list.
 
-The whole takes 15 minutes on one core.
+The whole took 18 minutes on one core that had other work.
 
 Strengths are sin phi = (s1 - s3)/(s1 + s3), means over strains that are the same for all: around the reference's peak, and from
 10 to 15 %. A packing's own highest value is given apart: it is the largest of a fluctuating curve. Modulus: deviator over axial strain at 2e-4.
