@@ -116,6 +116,9 @@ typedef struct RveAnswer {
 
 typedef struct RveBatch RveBatch;
 
+/* 1 if CUDA was built in and a device answers. */
+int rve_device_present(void);
+
 /* Creates `count` RVEs; RVE k is a copy of packings[packing_of_rve[k]] (NULL: all of packings[0]).
  * Copies what it needs; borrows nothing. BASE_ERROR_ARGUMENT, BASE_ERROR_MEMORY, BASE_ERROR_DEVICE. */
 BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, int packing_count,

@@ -36,8 +36,6 @@ typedef struct RveDeviceJob {
   RveAnswer answer; /* in: the last one; out */
 } RveDeviceJob;
 
-/* 1 if CUDA was built in and a device answers. */
-int rve_device_present(void);
 BaseStatus rve_device_create(const RveKernels **layout, RveDevice **device);
 void rve_device_destroy(RveDevice *device);
 /* (Re)places RVE k's arena on the device by a copy of the host's `arena`. */

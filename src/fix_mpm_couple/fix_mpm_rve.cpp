@@ -96,6 +96,17 @@ void FixMPMRve::check_keywords(const KeywordParser &parser) {
   }
 }
 
+/* All ranks take a GPU or none: another backend has other last bits, and a packing's answer must not depend on its rank. */
+void FixMPMRve::settle_backend() {
+  if (backend_ == RVE_BACKEND_CPU) return;
+  int present = rve_device_present(), everywhere;
+  MPI_Allreduce(&present, &everywhere, 1, MPI_INT, MPI_MIN, world);
+  if (everywhere) return;
+  if (backend_ == RVE_BACKEND_CUDA)
+    fix_warning(lmp, this, "keyword 'backend': 'cuda' is given, but not every rank has a GPU that answers; the packings run on the CPU");
+  backend_ = RVE_BACKEND_CPU;
+}
+
 void FixMPMRve::read_damping(KeywordParser &parser) {
   scene_.local_damping = scene_.critical_damping = 0.0;
   const int kind = parser.choice(DAMPINGS);
@@ -190,6 +201,7 @@ void FixMPMRve::prepare(const char *user, int type, bool thermal) {
     return;
   }
   if (scene.tangential_stiffness > 0.0) read_packings(scene.tangential_stiffness);
+  settle_backend();
   fix_check(lmp, this, rve_law_create(world, &scene, packings_.data(), (int)packings_.size(), backend_, &law_));
   fix_check(lmp, this, rve_law_set_replay(law_, replay_directory_.empty() ? NULL : replay_directory_.c_str()));
   if (!restart_state_.empty()) {

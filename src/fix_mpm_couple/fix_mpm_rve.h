@@ -68,6 +68,7 @@ class FixMPMRve : public Fix {
 
   void read_keywords(int, char **);
   void check_keywords(const class KeywordParser &);
+  void settle_backend();
   void read_damping(class KeywordParser &);
   void read_bonds(class KeywordParser &);
   void read_replay(class KeywordParser &);

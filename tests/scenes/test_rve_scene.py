@@ -79,6 +79,18 @@ def test_rves_answer_alike_on_1_2_3_4_ranks(thermal, dempm, tmp_path):
             assert many.table[name] == table[name], name
 
 
+@pytest.mark.parametrize("np", [1, 2])
+def test_without_a_gpu_one_warning_then_the_cpu(np, dempm, tmp_path, monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")
+    files = {"grains.data": packing()}
+    script = first(False, "run 20\nrun 20\n")
+    cpu = dempm(script.replace("damping viscous", "backend cpu damping viscous"), np=np, files=files, cwd=tmp_path / "cpu")
+    cuda = dempm(script.replace("damping viscous", "backend cuda damping viscous"), np=np, files=files, cwd=tmp_path / "cuda")
+    assert cpu.output.count("'cuda' is given") == 0
+    assert cuda.output.count("'cuda' is given, but not every rank has a GPU that answers") == 1
+    assert cuda.table == cpu.table
+
+
 @pytest.mark.parametrize("thermal", [False, True])
 @pytest.mark.parametrize("before, after", [(1, 1), (1, 2), (2, 1), (2, 3)])
 def test_restart_with_contact_history_continues_to_the_last_bit(before, after, thermal, dempm, tmp_path):
