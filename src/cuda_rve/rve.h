@@ -54,7 +54,7 @@ typedef struct RveScene {
                                  call, the whole deformation spread over them (quasi-static relaxation time) */
   double skin;                /* neighbour skin as a fraction of the largest radius; 0 = automatic */
   int share;                  /* 1: RVEs with the same packing and the same calls so far are computed once (default); the
-                                 results are the same to the last bit. 0: each by itself, e.g. to time them */
+                                 results are the same to the last bit; CPU only. 0: each by itself, e.g. to time them */
   int mixed;                  /* 1: contact forces in FP32, sums and positions as ever; needs AVX-512, else FP64 runs (see
                                  rve_batch_backend_name). Stresses differ by about 1e-5 of the mean stress. Default 0 */
   int threads;                /* OpenMP threads; 0 = OpenMP's own choice */
@@ -125,7 +125,8 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
                             const int *packing_of_rve, int count, RveBackend backend, RveBatch **batch);
 void rve_batch_destroy(RveBatch *batch); /* accepts NULL */
 int rve_batch_count(const RveBatch *batch);
-const char *rve_batch_backend_name(const RveBatch *batch); /* "cpu/avx512", "cpu/avx2", "cpu/plain", "cuda" */
+enum { RVE_BACKEND_BYTES = 24 }; /* room for a backend's name and its final zero */
+const char *rve_batch_backend_name(const RveBatch *batch); /* "cpu/avx512", "cpu/avx512_mixed", "cpu/avx2", "cpu/plain", "cuda" */
 const RveScene *rve_batch_scene(const RveBatch *batch);
 /* May change material parameters (friction, damping, substeps, bonds' strengths, threads, time step) between steps; refuses a change of
  * dimension, grain, stiffness sign, thermal or bonds flag. */

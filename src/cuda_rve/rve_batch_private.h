@@ -47,7 +47,7 @@ struct RveBatch {
   int threads;
   RveWorkspace *workspace;
   RveDeviceJob *job; /* [count] on a device */
-  char name[24];
+  char name[RVE_BACKEND_BYTES];
 };
 
 /* Sorts the call's RVEs by history and input into batch->twin[0..n). */

@@ -11,13 +11,12 @@
 #ifndef RVE_MIXED
 
 typedef rve_real rve_near;
-typedef rve_int near_int, near_image;
+typedef rve_int near_image;
 typedef rve_mask near_mask;
 #define NEAR_TINY 1e-300
 #define near_set rve_set
 #define near_load rve_load
 #define near_store rve_store
-#define near_load_int rve_load_int
 #define near_load_image rve_load_short
 #define near_store_image rve_store_short
 #define near_image_any(image, bits) rve_int_any_bit(image, rve_set_int(bits))

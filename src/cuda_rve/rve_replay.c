@@ -19,12 +19,12 @@ typedef struct ReplayHeader {
   double duration;
   RveFailure failure;
   char name[RVE_NAME_BYTES];
-  char backend[16];
+  char backend[RVE_BACKEND_BYTES];
   uint64_t checksum; /* of all above and the state */
 } ReplayHeader;
 
 static const char magic[8] = "dempmRPL";
-enum { REPLAY_VERSION = 1, MOST_BYTES = 1 << 30 };
+enum { REPLAY_VERSION = 2, MOST_BYTES = 1 << 30 };
 
 static uint64_t checksum_of(const ReplayHeader *header, const void *state) {
   const uint64_t hash = base_hash(header, offsetof(ReplayHeader, checksum), BASE_HASH_SEED);

@@ -39,7 +39,7 @@ typedef struct RveReplay {
   double duration; /* s */
   RveFailure failure;
   char name[RVE_NAME_BYTES];
-  char backend[24]; /* as rve_batch_backend_name(): only the same one repeats the failure bit for bit */
+  char backend[RVE_BACKEND_BYTES]; /* as rve_batch_backend_name(): only the same one repeats the failure bit for bit */
   void *state;      /* for rve_batch_unpack() */
   size_t bytes;
 } RveReplay;

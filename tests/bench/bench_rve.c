@@ -34,6 +34,7 @@ static RveScene scene_of(const Case *c) {
   scene.bonds = c->bonds;
   scene.bond_strength = 0.1;
   scene.substeps = 200;
+  scene.share = 0; /* as in job.h */
   return scene;
 }
 

@@ -18,6 +18,7 @@
 #include "cuda_rve/rve_outcome.h"
 #include "cuda_rve/rve_packing.h"
 #include "isa.h"
+#include "job.h"
 
 enum { FULL, ONLY, VISCOUS, BONDED, THERMAL, CASES, MOST_ROUNDS = 101, STEPS = 2000, LISTS = 20 };
 static const char *const case_name[CASES] = {"full", "only", "viscous", "bonded", "thermal"};
@@ -148,16 +149,7 @@ int main(int argc, char **argv) {
     fprintf(stderr, "usage: bench_rve_parts PACKING 2|3 [rounds]\n");
     return 2;
   }
-  RveScene *scene = &bench.scene;
-  *scene = rve_scene_default();
-  scene->dimension = dimension;
-  scene->grain = RVE_SPHERE;
-  scene->thickness = 0.01;
-  scene->density = 2650.0;
-  scene->normal_stiffness = scene->tangential_stiffness = 1e6;
-  scene->friction = 0.5;
-  scene->local_damping = 0.2;
-  scene->time_step = 2e-6;
+  bench.scene = job_scene(dimension);
   bench.isa = bench_isa(&bench.kernels);
   BaseStatus status = rve_packing_read(argv[1], dimension, &packing);
   packing.contacts = 0;

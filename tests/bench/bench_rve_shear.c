@@ -20,6 +20,7 @@
 #include <time.h>
 
 #include "cuda_rve/rve_packing.h"
+#include "job.h"
 
 enum { MOST_REPEATS = 1000 };
 
@@ -59,22 +60,11 @@ static int read_job(int argc, char **argv, Job *job) {
   job->steps = 20000;
   job->gas = 1.0;
   job->backend = RVE_BACKEND_CPU;
-  RveScene *scene = &job->scene;
-  *scene = rve_scene_default();
-  scene->grain = RVE_SPHERE;
-  scene->thickness = 0.01;
-  scene->density = 2650.0;
-  scene->normal_stiffness = scene->tangential_stiffness = 1e6;
-  scene->friction = 0.5;
-  scene->local_damping = 0.2;
-  scene->time_step = 2e-6;
-  scene->threads = 1;
-  scene->share = 0; /* all RVEs do the same: each must work for itself */
-  scene->expansion = 1e-5;
-  scene->pipe_resistance = 1e3;
   if (argc < 3) return 0;
   job->file = argv[1];
-  scene->dimension = atoi(argv[2]);
+  job->scene = job_scene(atoi(argv[2]));
+  job->scene.expansion = 1e-5;
+  job->scene.pipe_resistance = 1e3;
   for (int k = 3; k < argc; k += 2)
     if (k + 1 >= argc || !set(job, argv[k], argv[k + 1])) return 0;
   return job->rves > 0 && job->call > 0 && job->repeat > 0 && job->repeat <= MOST_REPEATS && job->steps > 0;
@@ -91,7 +81,7 @@ static BaseStatus read_packing(const Job *job, RvePacking *packing) {
   return BASE_OK;
 }
 
-static BaseStatus run(const Job *job, const RvePacking *packing, char name[24], double *seconds, double *processor,
+static BaseStatus run(const Job *job, const RvePacking *packing, char name[RVE_BACKEND_BYTES], double *seconds, double *processor,
                       double *first_coordination, RveAnswer *answer) {
   RveBatch *batch = NULL;
   RveInput *input = NULL;
@@ -101,7 +91,7 @@ static BaseStatus run(const Job *job, const RvePacking *packing, char name[24], 
   TRY_GOTO(rve_batch_create(&job->scene, packing, 1, NULL, job->rves, job->backend, &batch), status, done);
   TRY_GOTO(rve_batch_step(batch, job->rves, NULL, input, 0.0, answer), status, done);
   *first_coordination = answer[0].coordination;
-  snprintf(name, 24, "%s", rve_batch_backend_name(batch));
+  snprintf(name, RVE_BACKEND_BYTES, "%s", rve_batch_backend_name(batch));
   const double start = base_seconds(), used = processor_seconds();
   for (long k = 0; k < job->steps; k += job->call)
     TRY_GOTO(rve_batch_step(batch, job->rves, NULL, input, job->call * job->scene.time_step, answer), status, done);
@@ -134,7 +124,7 @@ int main(int argc, char **argv) {
   Job job;
   RvePacking packing = {0};
   RveAnswer *answer = NULL;
-  char name[24];
+  char name[RVE_BACKEND_BYTES];
   double first = 0.0;
   if (!read_job(argc, argv, &job)) {
     fprintf(stderr, "usage: bench_rve_shear PACKING 2|3 [keyword value]...; the keywords are in its source\n");

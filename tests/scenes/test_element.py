@@ -8,6 +8,7 @@ import re
 import pytest
 
 from conftest import BUILD, ROOT, execute
+from scripts import HEAD
 
 RADIUS, KN, THICKNESS = 0.005, 1e6, 0.075
 SMOOTH = f"--set kn={KN} --set kt=0 --set density=2650"
@@ -222,14 +223,16 @@ def test_failure_is_named_and_replayed(rve):
     assert code == 0 and "the failure is repeated at the same step" in output and output.count("grain 6 moves") == 2
 
 
-def test_replay_shows_what_grew(rve):
+@pytest.mark.parametrize("precision", ["double", "mixed"])
+def test_replay_shows_what_grew(precision, rve):
     """Crushed so fast that it fails in the middle of a call."""
     (rve.path / "crush.csv").write_text("time,Lyy\n0,-3000\n0.01,0\n")
-    words = f"run hex.data --path crush.csv {DISKS} --set damping/local=0.1 --every 1000000 --out out.csv"
+    words = f"run hex.data --path crush.csv {DISKS} --set damping/local=0.1 --set precision={precision} --every 1000000 --out out.csv"
     code, output = rve(words, check=False)
     step = int(re.search(r"unstable at DEM step (\d+)", output)[1])
     assert code == 1 and step > 1
     code, first = rve("replay out.csv.replay", check=False)
+    assert re.search(r"backend +(\S+), the failing run had \1$", first, re.MULTILINE), first
     code, second = rve("replay out.csv.replay --out slow.csv --every 1", check=False)
     assert code == 0 and "repeated at the same step" in first and "repeated at the same step" in second
     rows = table(rve.path / "slow.csv")
@@ -254,13 +257,7 @@ def test_wrong_replay_files_are_refused(rve):
 
 
 def test_fix_names_the_failure_and_writes_a_replay(dempm, tmp_path):
-    script = """\
-dimension       2
-units           si
-atom_style      granular
-atom_modify     map array
-newton          off
-communicate     single vel yes
+    script = HEAD + """\
 boundary        f f p
 region          box block -1 3 -1 3 -0.025 0.025 units box
 create_box      1 box

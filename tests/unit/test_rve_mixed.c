@@ -82,7 +82,7 @@ static void packings_follow_fp64(void **state) {
       const double loss = fabs(answer[1].damping_work - answer[0].damping_work) / answer[0].damping_work;
       printf("mixed, %dD %s: stress %.1e after one step; after 1e-3 s %.1e, friction %.1e, damping %.1e\n", dim, variant[v],
              once, stress, slip, loss);
-      assert_true(once < 5e-5);
+      assert_true(once < 2e-5); /* 3e-5 if the rounding of the cell were lost */
       assert_true(stress < 5e-4);
       assert_true(loss < 5e-3);
       if (v == 1 || v == 2) assert_true(slip < 5e-3);
