@@ -94,7 +94,7 @@ class FixMPMCouple : public Fix {
   /* The fix mpm/couple called `mpm_id`, for `asking`, a fix that belongs to it. Ends the program if there is none. */
   static FixMPMCouple *find(class LAMMPS *, const Fix *asking, const std::string &mpm_id);
   /* For fix mpm/vtk. */
-  const Mpm *mpm() const { return mpm_; }
+  Mpm *mpm() const { return mpm_; }
   class FixMPMRve *rve() const {
     return rve_;
   }

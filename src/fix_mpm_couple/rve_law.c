@@ -287,7 +287,7 @@ static BaseStatus update(void *content, MpmLawBatch *batch) {
 static void destroy(void *content) { rve_law_destroy(content); }
 
 void rve_law_as_mpm_law(RveLaw *law, MpmLaw *mpm_law) {
-  *mpm_law = (MpmLaw){"rve", law, rve_store_scene(law->store)->thermal, update, destroy};
+  *mpm_law = (MpmLaw){"rve", law, rve_store_scene(law->store)->thermal, update, destroy, NULL, NULL};
 }
 
 /* -- all RVEs at once ------------------------------------------------------------------------------------------ */

@@ -130,6 +130,13 @@ BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count);
 /* One step of dt seconds: P2G, grid, law, G2P in the scene's order. points [count] in and out, order kept. Collective.
  * BASE_ERROR_UNSTABLE names the first (lowest tag) point that is not finite. */
 BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt);
+/* The same in parts, for many steps: attach copies the state of points [count] into the core's own arrays and borrows
+ * `points`, whose entries are then out of date until write brings them up to date (order kept); advance does one step.
+ * Attach again after points changed and after an error. advance is collective; it reports what attach found wrong with
+ * points, too. */
+BaseStatus mpm_attach(Mpm *mpm, MpmPoint *points, int count);
+BaseStatus mpm_advance(Mpm *mpm, double dt);
+void mpm_write(const Mpm *mpm);
 /* Answers of the law for the initial state (stress of the packing, conductivity, modulus), without stepping. Sets
  * temperature_mapped and temperature_law to temperature: call it once for new points, not for restarted ones.
  * Collective. */
@@ -155,7 +162,7 @@ typedef struct MpmGridView {
   const double *temperature; /* [nodes]; NULL if not thermal */
   const unsigned char *owned;/* [nodes] 1 if this rank holds the node's lowest-tag point: owned by exactly one rank */
 } MpmGridView;
-void mpm_grid_view(const Mpm *mpm, MpmGridView *view);
+void mpm_grid_view(Mpm *mpm, MpmGridView *view);
 
 #ifdef __cplusplus
 }

@@ -9,39 +9,66 @@
 #include "mpm.h"
 #include "mpm_shape.h"
 
-typedef double MpmVec __attribute__((vector_size(32))); /* {scalar, x, y, z} */
-
 /* Cells and nodes have global integer indices relative to the scene's origin, packed into one key whose order is (z, y,
  * x). 2D: z = 0. */
 enum { MPM_KEY_BITS = 21, MPM_KEY_BIAS = 1 << 20 };
 #define MPM_KEY_MASK ((UINT64_C(1) << MPM_KEY_BITS) - 1)
 
-/* One line of the sorted list of points. The cell of a point is the first node of its support. */
+/* One line of a list of points that is to be sorted. The cell of a point is the first node of its support. */
 typedef struct MpmItem {
   uint64_t cell;
   int64_t tag;
-  int slot; /* own points in the caller's order, then foreign ones in the halo's */
+  int index; /* of whatever is sorted: slot, row, foreign point */
 } MpmItem;
 
-/* The core's copy of the points. "sorted" arrays follow (cell, tag), "slot" arrays the caller's order. */
+/* An array whose rows move when points change their order; spare: memory of the same size, which changes places. */
+typedef struct MpmPlane {
+  void **rows, **spare;
+  size_t width; /* bytes per row */
+} MpmPlane;
+enum { MPM_PLANES_MAX = 32 };
+
+/* The core's own state. Rows: own points by (cell, tag), then foreign ones by (cell, tag); they move only when points
+ * change their cells. What only heat, tractions and output need stays in the attached array ("home"), where the point of
+ * row k has the place slot[k]. Components of tensors are arrays of their own, so that laws run over them in vectors; in
+ * 2D those that do not take part are NULL (`volume0` includes F_zz). */
 typedef struct MpmPoints {
+  MpmPoint *home;     /* [own] borrowed; NULL: nothing attached */
   int own, foreign;   /* of this step */
   int live;           /* own points to work on: own, or 0 after a local error */
-  int count;          /* sorted points: own + foreign, or 0 after a local error */
-  int items, items_own; /* of the last sorted list: its length and its number of own slots */
+  int count;          /* rows to work on: own + foreign, or 0 after a local error */
   int room;           /* capacity of all arrays */
-  MpmItem *item, *spare, *mover;
-  uint64_t *cell;        /* slot */
-  unsigned char *placed; /* slot: found at its old place */
-  double (*place)[4];    /* sorted: x, y, z over h relative to origin; mass, kg */
-  MpmVec *motion;        /* sorted: {1, velocity} */
-  double (*half)[3];     /* sorted: half edges of the uGIMP domain over h */
-  double (*affine)[9];   /* sorted: APIC matrix */
-  double (*heat)[2];     /* sorted: heat capacity m c, J/K; times temperature, J */
-  MpmVec *load;          /* slot: [1 + dimension]: {W, N} at the point, then per axis {V q_j, -V sigma_ij} */
-  double *carry;         /* slot: [12] scratch for halo->forward */
-  MpmVec *gathered;      /* sorted: XPIC's intermediate velocities */
-  MpmLawBatch batch;     /* slot, own points */
+  int has_order;      /* rows 0 .. own are those of slot[] and in the cells of key[] */
+  int has_moved;      /* the order of own rows is new since the grid was built */
+  int has_stepped;    /* velocity_gradient holds the last step's */
+  double mass_low, mass_high; /* of own and foreign points */
+  MpmPlane plane[MPM_PLANES_MAX];
+  int planes;
+  void *spare[MPM_PLANES_MAX];
+  int *slot;          /* own rows */
+  uint64_t *key;      /* cell */
+  int64_t *tag;
+  MpmVec *position;   /* {mass, position}, kg, m */
+  MpmVec *place;      /* what P2G and G2P read: position, or the copy from before the update (USL, MUSL) */
+  MpmVec *old_position;
+  MpmVec *motion;     /* {1, velocity} */
+  MpmVec *half;       /* half edges of the uGIMP domain over h; lanes without meaning are 1/2. NULL: not uGIMP */
+  MpmVec *force;      /* {0, external force} */
+  double *volume0;    /* own rows, as the following */
+  double *deformation_gradient[9], *velocity_gradient[9], *stress[6];
+  double (*affine)[9]; /* APIC matrix, own and foreign */
+  double (*heat)[2];   /* heat capacity m c, J/K; times temperature, J */
+  MpmVec *load;        /* [1 + dimension]: {W, N} at the point, then per axis {V q_j, -V sigma_ij} */
+  int load_room;
+  MpmVec *gathered;    /* XPIC: {1, intermediate velocity} */
+  double *carry;       /* slot: scratch for halo->forward */
+  unsigned char *moves; /* own rows: leaves its cell */
+  int *from;            /* new row -> old row */
+  int *foreign_slot;    /* foreign row - own -> the halo's order */
+  MpmItem *item, *spare_item;
+  /* Of laws without `advance`: slot, own points. */
+  int batch_room;
+  MpmLawBatch batch;
   int64_t *law_tag;
   double *law_velocity_gradient, *law_deformation_gradient, *law_temperature, *law_temperature_rate;
 } MpmPoints;
@@ -50,12 +77,16 @@ typedef struct MpmPoints {
  * to the box. */
 typedef struct MpmGrid {
   int cells, nodes, cell_room, node_room;
-  int ranges, range_room;
+  int is_current;      /* for the present order of points */
   uint64_t *cell_key;
-  int *cell_first;     /* [cells + 1] in the sorted points */
+  int *cell_first;     /* [cells + 1] own rows */
+  /* With foreign points: the rows of a cell in the order of tags, as stretches of rows [first, end). */
+  int runs, run_room;
+  int *run_first;      /* [cells + 1] */
+  int (*run)[2];
   int (*cell_row)[9];  /* first node of each row of the support; row = b + width c */
   uint64_t *node_key;
-  int (*index)[3];     /* [nodes] */
+  int has_index, (*index)[3]; /* [nodes], if has_index */
   /* Slabs of MPM_SLAB layers of cells of the outermost axis, by global index; slabs of one colour share no node. */
   int slabs[2], *slab[2]; /* [slabs][2] first cell, end */
   MpmVec *sum;         /* {mass, momentum}, kg and N s */
@@ -96,7 +127,6 @@ struct Mpm {
   double inverse_spacing;
   int threads; /* OpenMP threads of a pass */
   double dt;
-  const MpmPoint *foreign_points;
   MpmPoints points;
   MpmGrid grid;
   MpmContact *contacts;
@@ -111,52 +141,93 @@ struct Mpm {
   const char *point_fault;
 };
 
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#define MPM_CLONES __attribute__((target_clones("avx2", "default"))) /* same bits: no contraction */
+#else
+#define MPM_CLONES
+#endif
+
 enum { MPM_PARALLEL_POINTS = 2000 /* fewer: threads cost more than they bring */ };
 
 static inline int mpm_width(const Mpm *mpm) { return mpm_shape_width(mpm->scene.shape); }
 static inline int mpm_load_width(const Mpm *mpm) { return 1 + mpm->scene.dimension; }
 
-static inline const MpmPoint *mpm_slot_point(const Mpm *mpm, const MpmPoint *own, int slot) {
-  return slot < mpm->points.own ? own + slot : mpm->foreign_points + (slot - mpm->points.own);
+/* The array of loads is needed where something adds to what stress and external force alone give. */
+static inline int mpm_uses_load(const Mpm *mpm) { return mpm->halo || mpm->scene.thermal || mpm->traction_count > 0; }
+/* The law acts on rows where they lie. */
+static inline int mpm_law_is_local(const Mpm *mpm) {
+  return mpm->law->advance && !mpm->scene.thermal && !mpm->law->thermal;
 }
+static inline int mpm_is_parallel(const Mpm *mpm) {
+  return mpm->threads > 1 && mpm->points.count > MPM_PARALLEL_POINTS;
+}
+/* Loops over a tensor's components that take part: 9, or the 4 of the plane. */
+static inline int mpm_component(int dimension, int n) { return dimension == 3 ? n : n + n / 2; }
 
 /* Remembers a local error (the first one) without leaving the step. */
 void mpm_note_error(Mpm *mpm, BaseStatus status);
 /* Remembers what is wrong with a point; the lowest tag wins. Thread-safe. */
 void mpm_note_point(Mpm *mpm, BaseStatus status, int64_t tag, const char *fault);
 
+/* mpm_step.c */
+BaseStatus mpm_forward_rows(Mpm *mpm, MpmVec *vector, double (*tensor)[9]);
+
 /* mpm_points.c */
 BaseStatus mpm_points_reserve(Mpm *mpm, int count);
+BaseStatus mpm_batch_reserve(Mpm *mpm, int count);
 void mpm_points_free(Mpm *mpm);
-BaseStatus mpm_points_sort(Mpm *mpm, const MpmPoint *own); /* fills item[] by (cell, tag) */
-void mpm_points_load(Mpm *mpm, const MpmPoint *own);       /* fills the sorted arrays */
+/* Rows from the attached array; keeps their order if it holds the same points. Notes faults of points. */
+BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count);
+void mpm_points_load_foreign(Mpm *mpm, const MpmPoint *foreign);
+void mpm_points_load_heat(Mpm *mpm, const MpmPoint *foreign);
+void mpm_points_write(const Mpm *mpm, int what); /* to the attached array */
+enum { MPM_WRITE_MOTION = 1 /* position, velocity, affine matrix */, MPM_WRITE_SHAPE = 2 /* F */,
+       MPM_WRITE_LAW = 4 /* stress, velocity gradient, answers of a law with `advance` */, MPM_WRITE_ALL = 7 };
+void mpm_row_deformation(const Mpm *mpm, int row, double f[9]);
+double mpm_row_volume(const Mpm *mpm, int row); /* current, m3 */
+/* Half edges over h of a point's uGIMP domain. */
+MpmVec mpm_half_edges(const Mpm *mpm, const double size0[3], const double f[9]);
+const char *mpm_find_fault(const Mpm *mpm, const MpmPoint *point, BaseStatus *status); /* NULL: none */
+
+/* mpm_sort.c */
+void mpm_sort_items(MpmItem **item, MpmItem **spare, int n); /* by (cell, tag); the two may change places */
+uint64_t mpm_find_cell(Mpm *mpm, MpmVec position, MpmVec half, int64_t tag); /* 0, and a note, if it is too far away */
+BaseStatus mpm_points_order(Mpm *mpm); /* moves rows of own points that have left their cells; checks that all are finite */
 
 /* mpm_grid.c */
-BaseStatus mpm_grid_build(Mpm *mpm); /* cells, slabs, nodes from the sorted points */
+BaseStatus mpm_grid_build(Mpm *mpm); /* cells, slabs, nodes from the rows */
+void mpm_grid_find_index(Mpm *mpm);
 void mpm_grid_free(MpmGrid *grid);
 
-/* mpm_transfer.c */
-enum { MPM_GRADIENT_VELOCITY = 1, MPM_GRADIENT_TEMPERATURE = 2 };
-void mpm_p2g_momentum(Mpm *mpm, int with_heat, int with_affine);     /* motion, heat -> sum, heat, scale, owned */
-void mpm_p2g_load(Mpm *mpm);                                         /* load -> rate */
-void mpm_g2p_gradient(Mpm *mpm, MpmPoint *points, int what);         /* state -> velocity, temperature gradient */
-void mpm_g2p_update(Mpm *mpm, MpmPoint *points);                     /* state, rate -> the points' new velocity, ... */
-void mpm_g2p_velocity(Mpm *mpm, const MpmVec *field);                /* field -> gathered */
+/* mpm_p2g.c: motion, heat -> sum, heat; load, or force and stress -> rate */
+void mpm_p2g_momentum(Mpm *mpm, const MpmVec *motion, int with_heat, int with_affine);
+void mpm_p2g_load(Mpm *mpm);
+void mpm_p2g_load_cells(Mpm *mpm, int first, int end); /* force and stress of some cells, added to rate */
+
+/* mpm_g2p.c */
+void mpm_g2p_temperature_gradient(Mpm *mpm);           /* state -> temperature gradient of own points */
+void mpm_g2p_velocity_gradient(Mpm *mpm);              /* state -> velocity gradient of own rows */
+void mpm_g2p_velocity_gradient_cells(Mpm *mpm, int first, int end);
+void mpm_g2p_update(Mpm *mpm);                         /* state, rate -> the points' new velocity, ... */
+void mpm_g2p_velocity(Mpm *mpm, const MpmVec *field);  /* field -> gathered */
+
+/* mpm_fused.c */
+/* Gradient, local law and, with_load, its load on the nodes, some cells at a time: they stay in the cache. */
+void mpm_stress(Mpm *mpm, int with_load);
 
 /* mpm_xpic.c */
 BaseStatus mpm_extended_velocity(Mpm *mpm);                          /* XPIC: state -> extended. Collective */
 
 /* mpm_law_batch.c */
-/* The law for own points; with_load also fills their loads, while the points are in the cache. Collective. */
-BaseStatus mpm_law_run(Mpm *mpm, MpmPoint *points, double dt, int with_load);
-void mpm_load_fill(Mpm *mpm, const MpmPoint *points);         /* loads of own points */
-/* Tractions, flux walls, loads of foreign points. Collective. */
-BaseStatus mpm_load_finish(Mpm *mpm, const MpmPoint *points);
+BaseStatus mpm_law_run(Mpm *mpm, double dt); /* the law for own points, from velocity_gradient. Collective */
+void mpm_law_rows(Mpm *mpm, int first, int end); /* the same, and F, of a local law for some rows */
+/* Loads: own points', tractions, flux walls, those of foreign points. Collective. */
+BaseStatus mpm_load_fill(Mpm *mpm);
 
 /* mpm_heat.c */
 void mpm_heat_start(Mpm *mpm);                                       /* nodal temperature, temperature walls */
 void mpm_heat_update(Mpm *mpm);                                      /* rate of nodal temperature, walls' heat flow */
-void mpm_heat_walls(Mpm *mpm, const MpmPoint *points, MpmVec *load); /* flux walls: heat of the outermost points */
+void mpm_heat_walls(Mpm *mpm, MpmVec *load); /* flux walls: heat of the outermost points */
 
 /* mpm_wall.c */
 BaseStatus mpm_wall_find(Mpm *mpm);       /* contacts: the nodes under each wall; zeroes the walls' outputs */
@@ -164,11 +235,11 @@ void mpm_wall_start(Mpm *mpm);            /* kinematic condition on the nodal ve
 void mpm_wall_update(Mpm *mpm);           /* impulses on the updated velocity; the walls' outputs */
 double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], double normal[3]);
 int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]);
-/* The face of the point's deformed domain that looks most along the normal: area vector, m2, and its projection on the
- * normal. */
-double mpm_face_area(const MpmPoint *point, const double normal[3], double area[3]);
+/* The face of the point's domain, deformed by f, that looks most along the normal: area vector, m2, and its projection on
+ * the normal. */
+double mpm_face_area(const MpmPoint *point, const double f[9], const double normal[3], double area[3]);
 
 /* mpm_traction.c */
-void mpm_traction_add(Mpm *mpm, const MpmPoint *points, MpmVec *load);
+void mpm_traction_add(Mpm *mpm, MpmVec *load);
 
 #endif

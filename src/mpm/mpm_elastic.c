@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "../base/tensor.h"
-#include "mpm_law.h"
+#include "mpm_core.h"
 
 typedef struct Elastic {
   MpmElastic given;
@@ -16,12 +16,10 @@ typedef struct Elastic {
 } Elastic;
 
 /* sigma <- R sigma R^T with R = (I - W/2)^-1 (I + W/2), W the spin times dt. */
-static void rotate(const double spin[3], double stress[6]) {
+MPM_INLINE void rotate(const double spin[3], double stress[6]) {
   /* spin = (W_zy, W_xz, W_yx): the axial vector w with W a = w x a. R = I + 2/(1+q.q) (Q + Q Q), q = w/2. */
   const double x = 0.5 * spin[0], y = 0.5 * spin[1], z = 0.5 * spin[2];
-  const double square = x * x + y * y + z * z;
-  if (!(square > 0.0)) return;
-  const double s = 2.0 / (1.0 + square);
+  const double s = 2.0 / (1.0 + (x * x + y * y + z * z));
   const double r[9] = {1.0 - s * (y * y + z * z), s * (x * y - z), s * (x * z + y),
                        s * (x * y + z), 1.0 - s * (x * x + z * z), s * (y * z - x),
                        s * (x * z - y), s * (y * z + x), 1.0 - s * (x * x + y * y)};
@@ -29,16 +27,21 @@ static void rotate(const double spin[3], double stress[6]) {
                           stress[TENSOR_XY], stress[TENSOR_YY], stress[TENSOR_YZ],
                           stress[TENSOR_XZ], stress[TENSOR_YZ], stress[TENSOR_ZZ]};
   double left[9];
-  tensor_multiply(r, full, left);
-  static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+#pragma GCC unroll 9
+  for (int k = 0; k < 9; k++) {
+    const double *a = r + 3 * (k / 3), *b = full + k % 3;
+    left[k] = a[0] * b[0] + a[1] * b[3] + a[2] * b[6];
+  }
+#pragma GCC unroll 6
   for (int k = 0; k < 6; k++) {
-    const double *a = left + 3 * row[k], *b = r + 3 * column[k];
+    const int row = k < 3 ? k : k == 5 ? 1 : 0, column = k < 3 ? k : k == 3 ? 1 : 2;
+    const double *a = left + 3 * row, *b = r + 3 * column;
     stress[k] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   }
 }
 
 /* D dt and the spin's axial vector times dt from L. */
-static void increments(const double *l, double dt, double strain[6], double spin[3]) {
+MPM_INLINE void increments(const double *l, double dt, double strain[6], double spin[3]) {
   strain[TENSOR_XX] = dt * l[0], strain[TENSOR_YY] = dt * l[4], strain[TENSOR_ZZ] = dt * l[8];
   strain[TENSOR_XY] = 0.5 * dt * (l[1] + l[3]), strain[TENSOR_XZ] = 0.5 * dt * (l[2] + l[6]);
   strain[TENSOR_YZ] = 0.5 * dt * (l[5] + l[7]);
@@ -77,18 +80,80 @@ static double wave_modulus(const Elastic *law) {
   return law->given.mode == MPM_ELASTIC_BAR ? law->given.young : law->lambda + 2.0 * law->mu;
 }
 
+/* The same in the plane, where xz and yz are 0 and stay so. */
+MPM_INLINE void update_plane(const Elastic *law, double lambda, double out_of_plane, const double l[9], double dt,
+                             double s[4]) {
+  const double xx = dt * l[0], yy = dt * l[4], xy = 0.5 * dt * (l[1] + l[3]), spin = 0.25 * dt * (l[3] - l[1]);
+  const double twice = 2.0 / (1.0 + spin * spin), c = 1.0 - twice * (spin * spin), r = twice * spin;
+  const double left[4] = {c * s[0] - r * s[3], c * s[3] - r * s[1], r * s[0] + c * s[3], r * s[3] + c * s[1]};
+  const double all = lambda * (xx + yy), mu = 2.0 * law->mu;
+  s[0] = left[0] * c - left[1] * r + (mu * xx + all);
+  s[1] = left[2] * r + left[3] * c + (mu * yy + all);
+  s[2] = out_of_plane * (s[2] + all);
+  s[3] = left[0] * r + left[1] * c + mu * xy;
+}
+
+/* One mode per loop, so that it runs in vectors. */
+MPM_INLINE void advance_plane(const Elastic *law, double out_of_plane, const MpmLawRows *rows) {
+  const double *l0 = rows->velocity_gradient[0], *l1 = rows->velocity_gradient[1], *l3 = rows->velocity_gradient[3];
+  const double *l4 = rows->velocity_gradient[4], dt = rows->dt;
+  double *s0 = rows->stress[0], *s1 = rows->stress[1], *s2 = rows->stress[2], *s3 = rows->stress[3];
+#pragma omp simd
+  for (int p = 0; p < rows->n; p++) {
+    const double l[9] = {l0[p], l1[p], 0.0, l3[p], l4[p], 0.0, 0.0, 0.0, 0.0};
+    double s[4] = {s0[p], s1[p], s2[p], s3[p]};
+    update_plane(law, law->lambda, out_of_plane, l, dt, s);
+    s0[p] = s[0], s1[p] = s[1], s2[p] = s[2], s3[p] = s[3];
+  }
+}
+
+MPM_INLINE void advance_space(const Elastic *law, const MpmLawRows *rows) {
+  const double dt = rows->dt;
+#pragma omp simd
+  for (int p = 0; p < rows->n; p++) {
+    double l[9], s[6], strain[6], spin[3];
+#pragma GCC unroll 9
+    for (int n = 0; n < 9; n++) l[n] = rows->velocity_gradient[n][p];
+#pragma GCC unroll 6
+    for (int n = 0; n < 6; n++) s[n] = rows->stress[n][p];
+    increments(l, dt, strain, spin);
+    rotate(spin, s);
+    const double all = law->lambda * (strain[TENSOR_XX] + strain[TENSOR_YY] + strain[TENSOR_ZZ]);
+#pragma GCC unroll 6
+    for (int n = 0; n < 6; n++) rows->stress[n][p] = s[n] + (2.0 * law->mu * strain[n] + (n < 3 ? all : 0.0));
+  }
+}
+
+MPM_INLINE void advance_bar(const Elastic *law, const MpmLawRows *rows) {
+  for (int p = 0; p < rows->n; p++)
+    rows->stress[TENSOR_XX][p] += law->given.young * (rows->dt * rows->velocity_gradient[0][p]);
+  for (int n = 1; n < 6; n++) memset(rows->stress[n], 0, (size_t)rows->n * sizeof(double));
+}
+
+MPM_CLONES static void elastic_advance(const void *content, const MpmLawRows *rows) {
+  const Elastic *law = content;
+  if (law->given.mode == MPM_ELASTIC_BAR) advance_bar(law, rows);
+  else if (rows->dimension == 3) advance_space(law, rows);
+  else advance_plane(law, law->given.mode == MPM_ELASTIC_PLANE_STRESS ? 0.0 : 1.0, rows);
+}
+
+static void elastic_describe(const void *content, const double stress[6], double *modulus,
+                             double scalars[MPM_LAW_SCALARS]) {
+  const Elastic *law = content;
+  *modulus = wave_modulus(law);
+  for (int k = 0; k < MPM_LAW_SCALARS; k++) scalars[k] = 0.0;
+  scalars[MPM_LAW_ENERGY_DENSITY] = energy_density(&law->given, stress);
+}
+
 static BaseStatus elastic_update(void *content, MpmLawBatch *batch) {
   const Elastic *law = content;
-  const double modulus = wave_modulus(law);
   const int n = batch->n;
 #pragma omp parallel for if (n > 4000)
   for (int p = 0; p < n; p++) {
     const double heating = law->given.thermal ? batch->temperature_rate[p] * batch->dt : 0.0;
     double *stress = batch->stress + 6 * (size_t)p, *scalars = batch->scalars + MPM_LAW_SCALARS * (size_t)p;
     if (batch->dt > 0.0) update_stress(law, batch->velocity_gradient + 9 * (size_t)p, batch->dt, heating, stress);
-    batch->modulus[p] = modulus;
-    for (int k = 0; k < MPM_LAW_SCALARS; k++) scalars[k] = 0.0;
-    scalars[MPM_LAW_ENERGY_DENSITY] = energy_density(&law->given, stress);
+    elastic_describe(law, stress, &batch->modulus[p], scalars);
     if (!law->given.thermal) continue;
     batch->heat[p] = 0.0;
     memcpy(batch->conductivity + 6 * (size_t)p, law->given.conductivity, sizeof law->given.conductivity);
@@ -142,6 +207,7 @@ BaseStatus mpm_elastic_create(const MpmElastic *elastic, MpmLaw *law) {
     content->lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
     content->thermal = young * beta / (1.0 - 2.0 * poisson);
   }
-  *law = (MpmLaw){"elastic", content, elastic->thermal, elastic_update, elastic_destroy};
+  *law = (MpmLaw){"elastic", content, elastic->thermal, elastic_update, elastic_destroy, elastic_advance,
+                  elastic_describe};
   return BASE_OK;
 }

@@ -5,7 +5,7 @@
 
 #include "mpm_core.h"
 
-enum { MPM_SLAB = 4 /* layers of cells; >= support width - 1, so that slabs of one colour share no node */ };
+enum { MPM_SLAB = 2 /* layers of cells; >= support width - 1, so that slabs of one colour share no node */ };
 
 static BaseStatus reserve_cells(MpmGrid *grid, int cells) {
   if (cells <= grid->cell_room && grid->cell_room > 0) return BASE_OK; /* without points the end mark needs room, too */
@@ -13,6 +13,7 @@ static BaseStatus reserve_cells(MpmGrid *grid, int cells) {
   TRY(BASE_GROW(kept, room + 1, &grid->cell_key));
   TRY(BASE_GROW(kept, room + 1, &grid->cell_first));
   TRY(BASE_GROW(kept, room, &grid->cell_row));
+  TRY(BASE_GROW(kept, room + 1, &grid->run_first));
   for (int colour = 0; colour < 2; colour++) TRY(BASE_GROW(0, 2 * room, &grid->slab[colour]));
   grid->cell_room = (int)room;
   return BASE_OK;
@@ -46,7 +47,7 @@ void mpm_grid_free(MpmGrid *grid) {
       grid->cell_key, grid->cell_first, grid->cell_row,   grid->index,      grid->slab[0],       grid->slab[1],
       grid->sum,      grid->heat,       grid->scale,      grid->lowest_tag, grid->state,         grid->rate,
       grid->extended, grid->term,       grid->contact_of, grid->view_mass,  grid->view_velocity, grid->view_temperature,
-      grid->owned,    grid->dilated[0], grid->dilated[1]};
+      grid->owned,    grid->dilated[0], grid->dilated[1], grid->run,        grid->run_first};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   for (int axis = 0; axis < 3; axis++)
     for (int w = 0; w < MPM_WIDTH_MAX; w++) base_free(grid->position[axis][w]);
@@ -98,8 +99,7 @@ static BaseStatus build_nodes(Mpm *mpm) {
   grid->nodes = count[dimension - 1];
   TRY(reserve_nodes(grid, grid->nodes, mpm->scene.thermal, mpm->scene.transfer == MPM_TRANSFER_XPIC));
   grid->node_key = grid->dilated[dimension == 3 ? 0 : 1];
-  for (int n = 0; n < grid->nodes; n++)
-    for (int i = 0; i < 3; i++) grid->index[n][i] = i < dimension ? unpack(grid->node_key[n], i) : 0;
+  grid->has_index = 0;
   for (int cell = 0; cell < grid->cells; cell++)
     for (int c = 0; c < depth; c++)
       for (int b = 0; b < width; b++) {
@@ -123,29 +123,131 @@ static void build_slabs(Mpm *mpm) {
   }
 }
 
+void mpm_grid_find_index(Mpm *mpm) {
+  MpmGrid *grid = &mpm->grid;
+  if (grid->has_index) return;
+  for (int n = 0; n < grid->nodes; n++)
+    for (int i = 0; i < 3; i++) grid->index[n][i] = i < mpm->scene.dimension ? unpack(grid->node_key[n], i) : 0;
+  grid->has_index = 1;
+}
+
+/* ------------------------------------------------------------------------------------------------------- cells */
+
+static BaseStatus add_run(MpmGrid *grid, int first, int end) {
+  if (grid->runs == grid->run_room) {
+    const size_t room = 2 * (size_t)grid->run_room + 256;
+    TRY(BASE_GROW((size_t)grid->runs, room, &grid->run));
+    grid->run_room = (int)room;
+  }
+  grid->run[grid->runs][0] = first, grid->run[grid->runs++][1] = end;
+  return BASE_OK;
+}
+
+/* The stretches of rows of one cell, own and foreign merged by tag. */
+static BaseStatus add_runs(MpmGrid *grid, const MpmPoints *p, const int own[2], const int foreign[2]) {
+  int i = own[0], j = foreign[0];
+  while (i < own[1] || j < foreign[1]) {
+    int *row = j == foreign[1] || (i < own[1] && p->tag[i] <= p->tag[j]) ? &i : &j;
+    const int is_own = row == &i, end = is_own ? own[1] : foreign[1], other = is_own ? j : i;
+    const int is_last = is_own ? j == foreign[1] : i == own[1], first = *row;
+    if (!is_last && p->tag[i] == p->tag[j])
+      return base_error(BASE_ERROR_ARGUMENT, "point %lld: its tag occurs twice; tags must be unique",
+                        (long long)p->tag[i]);
+    while (*row < end && (is_last || p->tag[*row] < p->tag[other])) ++*row;
+    TRY(add_run(grid, first, *row));
+  }
+  return BASE_OK;
+}
+
+static int cell_end(const MpmPoints *p, int row, int end) {
+  int k = row;
+  while (k < end && p->key[k] == p->key[row]) k++;
+  return k;
+}
+
+/* Cells of own and foreign points. *changed: other cells than before. */
+static BaseStatus list_cells(Mpm *mpm, int *changed) {
+  MpmGrid *grid = &mpm->grid;
+  const MpmPoints *p = &mpm->points;
+  const int own_end = p->count ? p->own : 0, end = p->count;
+  int cells = 0, own = 0, foreign = own_end;
+  grid->runs = 0;
+  *changed = 0;
+  while (own < own_end || foreign < end) {
+    const uint64_t key = foreign == end || (own < own_end && p->key[own] <= p->key[foreign]) ? p->key[own] : p->key[foreign];
+    if (cells == grid->cell_room) TRY(reserve_cells(grid, cells + 1));
+    const int own_range[2] = {own, own < own_end && p->key[own] == key ? cell_end(p, own, own_end) : own};
+    const int foreign_range[2] = {foreign, foreign < end && p->key[foreign] == key ? cell_end(p, foreign, end) : foreign};
+    *changed |= cells >= grid->cells || grid->cell_key[cells] != key;
+    grid->cell_key[cells] = key;
+    grid->cell_first[cells] = own;
+    grid->run_first[cells++] = grid->runs;
+    if (p->foreign > 0) TRY(add_runs(grid, p, own_range, foreign_range));
+    own = own_range[1], foreign = foreign_range[1];
+  }
+  TRY(reserve_cells(grid, cells));
+  *changed |= cells != grid->cells;
+  grid->cells = cells;
+  grid->cell_first[cells] = own;
+  grid->run_first[cells] = grid->runs;
+  return BASE_OK;
+}
+
+/* -------------------------------------------------------------------------------- what follows from the cells */
+
+/* The row of a cell's lowest tag. */
+static int first_row(const MpmGrid *grid, const MpmPoints *p, int cell) {
+  return p->foreign > 0 ? grid->run[grid->run_first[cell]][0] : grid->cell_first[cell];
+}
+
+static double largest_mass(const MpmGrid *grid, const MpmPoints *p, int cell) {
+  double mass = 0.0;
+  for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++)
+    mass = p->position[k][0] > mass ? p->position[k][0] : mass;
+  for (int r = grid->run_first[cell]; r < grid->run_first[cell + 1]; r++)
+    for (int k = grid->run[r][0]; k < grid->run[r][1]; k++) mass = p->position[k][0] > mass ? p->position[k][0] : mass;
+  return mass;
+}
+
+/* Whose a node is, and the largest mass around it. Without foreign points, and with equal masses, it is known. */
+static void describe_nodes(Mpm *mpm) {
+  MpmGrid *grid = &mpm->grid;
+  const MpmPoints *p = &mpm->points;
+  const int width = mpm_width(mpm), rows = mpm->scene.dimension == 3 ? width * width : width;
+  const int with_mass = p->mass_low != p->mass_high, with_owner = p->foreign > 0;
+  for (int n = 0; n < grid->nodes; n++) {
+    grid->scale[n] = with_mass ? 0.0 : p->mass_low;
+    grid->owned[n] = 1;
+    if (with_owner) grid->lowest_tag[n] = INT64_MAX;
+  }
+  if (!with_mass && !with_owner) return;
+  for (int cell = 0; cell < grid->cells; cell++) {
+    const int lowest = first_row(grid, p, cell);
+    const double mass = with_mass ? largest_mass(grid, p, cell) : p->mass_low;
+    for (int r = 0; r < rows; r++)
+      for (int a = 0; a < width; a++) {
+        const int n = grid->cell_row[cell][r] + a;
+        grid->scale[n] = mass > grid->scale[n] ? mass : grid->scale[n];
+        if (!with_owner || p->tag[lowest] >= grid->lowest_tag[n]) continue;
+        grid->lowest_tag[n] = p->tag[lowest];
+        grid->owned[n] = lowest < p->own;
+      }
+  }
+}
+
 BaseStatus mpm_grid_build(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
-  const MpmPoints *points = &mpm->points;
-  int cells = 0;
-  for (int k = 0; k < points->count; k++) cells += k == 0 || points->item[k].cell != points->item[k - 1].cell;
-  TRY(reserve_cells(grid, cells));
-
-  int changed = cells != grid->cells, cell = 0;
-  for (int k = 0; k < points->count; k++) {
-    const uint64_t key = points->item[k].cell;
-    if (k > 0 && key == points->item[k - 1].cell) continue;
-    changed |= grid->cell_key[cell] != key;
-    grid->cell_key[cell] = key;
-    grid->cell_first[cell++] = k;
+  if (grid->is_current && !mpm->points.has_moved && !mpm->halo) return BASE_OK;
+  int changed;
+  const int was_current = grid->is_current;
+  grid->is_current = 0; /* no half-built grid that looks current */
+  TRY(list_cells(mpm, &changed));
+  if (changed || !was_current) {
+    TRY(build_nodes(mpm));
+    build_slabs(mpm);
   }
-  grid->cell_first[cells] = points->count;
-  grid->cells = cells;
-  if (!changed) return BASE_OK;
-  const BaseStatus status = build_nodes(mpm);
-  if (status != BASE_OK) {
-    grid->cells = grid->nodes = 0; /* no half-built grid that looks current */
-    return status;
-  }
-  build_slabs(mpm);
+  describe_nodes(mpm);
+  grid->is_current = 1;
+  mpm->points.has_moved = 0;
   return BASE_OK;
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Heat on the grid: explicit, lumped capacity (TM-DEMPM eq. 14-21, signs of the loads as corrected in eq. 17). */
-#include "../base/tensor.h"
 #include "mpm_core.h"
 
 /* T_I = sum m c S T_p / C_I; nodes under a temperature wall take the wall's (the last wall's, if there are several). */
@@ -32,20 +31,22 @@ void mpm_heat_update(Mpm *mpm) {
 }
 
 /* The flux enters through the outermost layer: points whose domain touches the wall, each with the area of its face. */
-void mpm_heat_walls(Mpm *mpm, const MpmPoint *points, MpmVec *load) {
+void mpm_heat_walls(Mpm *mpm, MpmVec *load) {
   const int dimension = mpm->scene.dimension, width = mpm_load_width(mpm);
   for (int w = 0; w < mpm->wall_count; w++) {
     MpmWall *wall = &mpm->walls[w];
     if (wall->heat != MPM_WALL_FLUX) continue;
-    for (int p = 0; p < mpm->points.own; p++) {
-      const MpmPoint *point = &points[p];
-      double normal[3], vector[3];
-      if (!mpm_wall_in_range(wall, dimension, point->position)) continue;
-      const double distance = mpm_wall_distance(wall, dimension, point->position, normal);
-      const double area = mpm_face_area(point, normal, vector);
-      const double layer = point->volume0 * tensor_determinant(point->deformation_gradient) / area;
+    for (int k = 0; k < mpm->points.own; k++) {
+      double normal[3], vector[3], f[9];
+      const MpmVec place = mpm->points.position[k];
+      const double position[3] = {place[1], place[2], place[3]};
+      if (!mpm_wall_in_range(wall, dimension, position)) continue;
+      mpm_row_deformation(mpm, k, f);
+      const double distance = mpm_wall_distance(wall, dimension, position, normal);
+      const double area = mpm_face_area(&mpm->points.home[mpm->points.slot[k]], f, normal, vector);
+      const double layer = mpm_row_volume(mpm, k) / area;
       if (!(distance <= layer)) continue;
-      load[(size_t)p * (size_t)width][0] += wall->flux * area;
+      load[(size_t)k * (size_t)width][0] += wall->flux * area;
       wall->heat_flow += wall->flux * area;
     }
   }

@@ -39,6 +39,15 @@ typedef struct MpmLawBatch {
   double *scalars;                    /* [n][MPM_LAW_SCALARS] */
 } MpmLawBatch;
 
+/* Points for `advance`: arrays of one component each. Two dimensions: only xx, xy, yx, yy (0, 1, 3, 4) of the velocity
+ * gradient and xx, yy, zz, xy (0 to 3) of the stress are there, the others are NULL. */
+typedef struct MpmLawRows {
+  int n, dimension;
+  double dt;                          /* s, > 0 */
+  const double *velocity_gradient[9]; /* [n] each, 1/s */
+  double *stress[6];                  /* [n] each, Pa; in and out */
+} MpmLawRows;
+
 /* A law = content + operations. All functions are collective over the ranks that share the scene. */
 typedef struct MpmLaw {
   const char *name;
@@ -46,6 +55,10 @@ typedef struct MpmLaw {
   int thermal;               /* 1 if heat and conductivity are written */
   BaseStatus (*update)(void *content, MpmLawBatch *batch);
   void (*destroy)(void *content);
+  /* Both or none (NULL): for laws whose answer to a point depends on that point alone and, without heat, is its new
+   * stress; everything else follows from the stress. Not collective, called by many threads at once. */
+  void (*advance)(const void *content, const MpmLawRows *rows);
+  void (*describe)(const void *content, const double stress[6], double *modulus, double scalars[MPM_LAW_SCALARS]);
 } MpmLaw;
 
 typedef enum MpmElasticMode {

@@ -1,32 +1,69 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The core's own arrays of points: growth, order by (cell, tag), copies in that order. */
+/* The core's own arrays of points: growth, filling from and writing to the attached array. */
 #include <math.h>
 #include <string.h>
 
+#include "../base/tensor.h"
 #include "mpm_core.h"
 
-static BaseStatus grow_sorted(Mpm *mpm, size_t old, size_t room) {
+/* ------------------------------------------------------------------------------------------------------ memory */
+
+#define ADD_PLANE(p, member) add_plane(p, (void **)&(p)->member, sizeof *(p)->member)
+static void add_plane(MpmPoints *p, void **rows, size_t width) {
+  p->plane[p->planes] = (MpmPlane){rows, &p->spare[p->planes], width};
+  p->planes++;
+}
+
+/* The arrays whose rows move with the points. velocity_gradient is found anew before it is read. */
+static void list_planes(Mpm *mpm) {
+  MpmPoints *p = &mpm->points;
+  const int dimension = mpm->scene.dimension;
+  p->planes = 0;
+  ADD_PLANE(p, slot);
+  ADD_PLANE(p, key);
+  ADD_PLANE(p, tag);
+  ADD_PLANE(p, position);
+  ADD_PLANE(p, motion);
+  ADD_PLANE(p, force);
+  ADD_PLANE(p, volume0);
+  if (mpm->scene.shape == MPM_SHAPE_GIMP) ADD_PLANE(p, half);
+  if (mpm->scene.transfer == MPM_TRANSFER_APIC) ADD_PLANE(p, affine);
+  for (int n = 0; n < dimension * dimension; n++) ADD_PLANE(p, deformation_gradient[mpm_component(dimension, n)]);
+  for (int n = 0; n < 6; n++) ADD_PLANE(p, stress[n]);
+}
+
+BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
   MpmPoints *p = &mpm->points;
   const MpmScene *scene = &mpm->scene;
-  TRY(BASE_GROW(old, room, &p->item)); /* the last order is worth keeping: see mpm_points_sort */
-  TRY(BASE_GROW(0, room, &p->spare));
-  TRY(BASE_GROW(0, room, &p->mover));
-  TRY(BASE_GROW(0, room, &p->place));
-  TRY(BASE_GROW(0, room, &p->motion));
-  if (scene->shape == MPM_SHAPE_GIMP) TRY(BASE_GROW(0, room, &p->half));
-  if (scene->transfer == MPM_TRANSFER_APIC) TRY(BASE_GROW(0, room, &p->affine));
+  if (count <= p->room) return BASE_OK;
+  const size_t room = (size_t)count + (size_t)count / 4 + 16;
+  list_planes(mpm);
+  for (int n = 0; n < p->planes; n++) {
+    TRY(base_grow((size_t)p->room, room, p->plane[n].width, p->plane[n].rows));
+    TRY(base_grow(0, room, p->plane[n].width, p->plane[n].spare));
+  }
+  for (int n = 0; n < scene->dimension * scene->dimension; n++)
+    TRY(BASE_GROW(0, room, &p->velocity_gradient[mpm_component(scene->dimension, n)]));
+  if (scene->order != MPM_ORDER_USF) TRY(BASE_GROW(0, room, &p->old_position));
   if (scene->thermal) TRY(BASE_GROW(0, room, &p->heat));
   if (scene->transfer == MPM_TRANSFER_XPIC) TRY(BASE_GROW(0, room, &p->gathered));
+  if (mpm->halo) {
+    TRY(BASE_GROW(0, 16 * room, &p->carry));
+    TRY(BASE_GROW(0, room, &p->foreign_slot));
+  }
+  TRY(BASE_GROW(0, room, &p->moves));
+  TRY(BASE_GROW(0, room, &p->from));
+  TRY(BASE_GROW(0, room, &p->item));
+  TRY(BASE_GROW(0, room, &p->spare_item));
+  p->room = (int)room;
   return BASE_OK;
 }
 
-static BaseStatus grow_slots(Mpm *mpm, size_t room) {
+BaseStatus mpm_batch_reserve(Mpm *mpm, int count) {
   MpmPoints *p = &mpm->points;
   MpmLawBatch *batch = &p->batch;
-  TRY(BASE_GROW(0, room, &p->cell));
-  TRY(BASE_GROW(0, room, &p->placed));
-  TRY(BASE_GROW(0, room * (size_t)mpm_load_width(mpm), &p->load));
-  TRY(BASE_GROW(0, 12 * room, &p->carry));
+  if (count <= p->batch_room) return BASE_OK;
+  const size_t room = (size_t)count + (size_t)count / 4 + 16;
   TRY(BASE_GROW(0, room, &p->law_tag));
   TRY(BASE_GROW(0, 9 * room, &p->law_velocity_gradient));
   TRY(BASE_GROW(0, 9 * room, &p->law_deformation_gradient));
@@ -44,49 +81,27 @@ static BaseStatus grow_slots(Mpm *mpm, size_t room) {
   batch->deformation_gradient = p->law_deformation_gradient;
   batch->temperature = p->law_temperature;
   batch->temperature_rate = p->law_temperature_rate;
-  return BASE_OK;
-}
-
-BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
-  MpmPoints *p = &mpm->points;
-  if (count <= p->room) return BASE_OK;
-  const size_t old = (size_t)p->room, room = (size_t)count + (size_t)count / 4 + 16;
-  TRY(grow_sorted(mpm, old, room));
-  TRY(grow_slots(mpm, room));
-  p->room = (int)room;
+  p->batch_room = (int)room;
   return BASE_OK;
 }
 
 void mpm_points_free(Mpm *mpm) {
   MpmPoints *p = &mpm->points;
-  void *const memory[] = {p->item, p->spare, p->mover, p->cell, p->placed, p->place, p->motion, p->half, p->affine,
-                          p->heat, p->load, p->carry, p->gathered, p->law_tag, p->law_velocity_gradient,
-                          p->law_deformation_gradient, p->law_temperature, p->law_temperature_rate,
-                          p->batch.stress, p->batch.heat, p->batch.conductivity,
-                          p->batch.modulus, p->batch.scalars};
+  for (int n = 0; n < p->planes; n++) {
+    void *rows;
+    memcpy(&rows, p->plane[n].rows, sizeof rows);
+    base_free(rows), base_free(p->spare[n]);
+  }
+  for (int n = 0; n < 9; n++) base_free(p->velocity_gradient[n]);
+  void *const memory[] = {p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->from, p->foreign_slot,
+                          p->item, p->spare_item, p->law_tag, p->law_velocity_gradient, p->law_deformation_gradient,
+                          p->law_temperature, p->law_temperature_rate, p->batch.stress, p->batch.heat,
+                          p->batch.conductivity, p->batch.modulus, p->batch.scalars};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   memset(p, 0, sizeof *p);
 }
 
-/* Half of the point's domain over h. Clamped: size0 may exceed the spacing by round-off. A domain that follows the
- * stretch has the length of F's row, weighted by the edges: right for any stretch along the axes, and the same after a
- * rotation. */
-static double half_edge(const Mpm *mpm, const MpmPoint *point, int axis) {
-  double half = 0.5 * point->size0[axis] * mpm->inverse_spacing;
-  if (mpm->scene.gimp_stretch) {
-    double square = 0.0;
-    for (int j = 0; j < mpm->scene.dimension; j++) {
-      const double edge = point->deformation_gradient[3 * axis + j] * point->size0[j];
-      square += edge * edge;
-    }
-    half = fmax(0.5 * sqrt(square) * mpm->inverse_spacing, 1e-6);
-  }
-  return half < 0.5 ? half : 0.5;
-}
-
-static double grid_coordinate(const Mpm *mpm, const MpmPoint *point, int axis) {
-  return (point->position[axis] - mpm->scene.origin[axis]) * mpm->inverse_spacing;
-}
+/* ------------------------------------------------------------------------------------------------------ checks */
 
 /* What is wrong with the constants of a point, or NULL. */
 static const char *find_argument_fault(const Mpm *mpm, const MpmPoint *point) {
@@ -115,142 +130,211 @@ static const char *find_state_fault(const Mpm *mpm, const MpmPoint *point) {
   return NULL;
 }
 
-/* The key of the first node of the point's support; 0 if the point is not usable. */
-static uint64_t find_cell(Mpm *mpm, const MpmPoint *point) {
+const char *mpm_find_fault(const Mpm *mpm, const MpmPoint *point, BaseStatus *status) {
   const char *fault = find_argument_fault(mpm, point);
-  const BaseStatus status = fault ? BASE_ERROR_ARGUMENT : BASE_ERROR_UNSTABLE;
-  if (!fault) fault = find_state_fault(mpm, point);
-  if (fault) {
-    mpm_note_point(mpm, status, point->tag, fault);
-    return 0;
-  }
-  uint64_t key = 0;
-  for (int i = mpm->scene.dimension - 1; i >= 0; i--) {
-    const double u = grid_coordinate(mpm, point, i);
-    const double base = floor(mpm_shape_anchor(mpm->scene.shape, u, half_edge(mpm, point, i)));
-    if (!(fabs(base) < MPM_KEY_BIAS - 8)) {
-      mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag,
-                     "position is more than 1,000,000 cells away from the grid's origin");
-      return 0;
+  *status = fault ? BASE_ERROR_ARGUMENT : BASE_ERROR_UNSTABLE;
+  return fault ? fault : find_state_fault(mpm, point);
+}
+
+/* Clamped: size0 may exceed the spacing by round-off. A domain that follows the stretch has the length of F's row,
+ * weighted by the edges: right for any stretch along the axes, and the same after a rotation. */
+MpmVec mpm_half_edges(const Mpm *mpm, const double size0[3], const double f[9]) {
+  MpmVec result = mpm_vec_all(0.5);
+  for (int i = 0; i < mpm->scene.dimension; i++) {
+    double half = 0.5 * size0[i] * mpm->inverse_spacing;
+    if (mpm->scene.gimp_stretch) {
+      double square = 0.0;
+      for (int j = 0; j < mpm->scene.dimension; j++) {
+        const double edge = f[3 * i + j] * size0[j];
+        square += edge * edge;
+      }
+      half = fmax(0.5 * sqrt(square) * mpm->inverse_spacing, 1e-6);
     }
-    key = key << MPM_KEY_BITS | (uint64_t)((int)base + MPM_KEY_BIAS);
+    result[1 + i] = half < 0.5 ? half : 0.5;
   }
-  return key;
+  return result;
 }
 
-static int precedes(const MpmItem *a, const MpmItem *b) {
-  if (a->cell != b->cell) return a->cell < b->cell;
-  if (a->tag != b->tag) return a->tag < b->tag;
-  return a->slot < b->slot;
+/* ----------------------------------------------------------------------------------------------------- filling */
+
+MPM_INLINE MpmVec vector_of(int dimension, double first, const double x[3]) {
+  return (MpmVec){first, x[0], x[1], dimension == 3 ? x[2] : 0.0};
 }
 
-static void insertion_sort(MpmItem *item, int n) {
-  for (int i = 1; i < n; i++) {
-    const MpmItem moving = item[i];
-    int j = i;
-    for (; j > 0 && precedes(&moving, &item[j - 1]); j--) item[j] = item[j - 1];
-    item[j] = moving;
-  }
-}
-
-/* Merges sorted a [na] and b [nb] into out [na + nb]. */
-static void merge(const MpmItem *a, int na, const MpmItem *b, int nb, MpmItem *out) {
-  int i = 0, j = 0;
-  while (i < na && j < nb) *out++ = precedes(&b[j], &a[i]) ? b[j++] : a[i++];
-  while (i < na) *out++ = a[i++];
-  while (j < nb) *out++ = b[j++];
-}
-
-/* Sorts *item [n]; *spare is memory of the same size. The two may change places. */
-static void merge_sort(MpmItem **item, MpmItem **spare, int n) {
-  enum { RUN = 16 };
-  for (int i = 0; i < n; i += RUN) insertion_sort(*item + i, n - i < RUN ? n - i : RUN);
-  for (int64_t run = RUN; run < n; run *= 2) {
-    for (int64_t i = 0; i < n; i += 2 * run) {
-      const int na = (int)(n - i < run ? n - i : run);
-      const int nb = (int)(n - i - na < run ? n - i - na : run);
-      merge(*item + i, na, *item + i + na, nb, *spare + i);
-    }
-    MpmItem *swap = *item;
-    *item = *spare, *spare = swap;
-  }
-}
-
-/* Keeps the lines of the last list whose point is still in its cell, in place. Returns their number. */
-static int keep_placed(Mpm *mpm, const MpmPoint *own) {
+/* What P2G and G2P need, own or foreign. */
+static void load_common(Mpm *mpm, int k, const MpmPoint *point) {
   MpmPoints *p = &mpm->points;
-  int kept = 0;
-  memset(p->placed, 0, (size_t)(p->own + p->foreign));
-  for (int k = 0; k < p->items; k++) {
-    MpmItem line = p->item[k];
-    const int is_own = line.slot < p->items_own;
-    const int index = is_own ? line.slot : line.slot - p->items_own;
-    if (index >= (is_own ? p->own : p->foreign)) continue;
-    line.slot = is_own ? index : p->own + index;
-    if (p->cell[line.slot] != line.cell || mpm_slot_point(mpm, own, line.slot)->tag != line.tag) continue;
-    p->placed[line.slot] = 1;
-    p->item[kept++] = line;
-  }
-  return kept;
+  const int dimension = mpm->scene.dimension;
+  p->tag[k] = point->tag;
+  p->position[k] = vector_of(dimension, point->mass, point->position);
+  p->motion[k] = vector_of(dimension, 1.0, point->velocity);
+  if (p->half) p->half[k] = mpm_half_edges(mpm, point->size0, point->deformation_gradient);
+  if (p->affine) memcpy(p->affine[k], point->affine, sizeof point->affine);
 }
 
-/* The same tag twice in one cell would make the order of sums ambiguous. */
-static BaseStatus check_unique(const MpmPoints *p, int count) {
+static void load_own(Mpm *mpm, int k, const MpmPoint *point) {
+  MpmPoints *p = &mpm->points;
+  const int dimension = mpm->scene.dimension;
+  load_common(mpm, k, point);
+  p->force[k] = vector_of(dimension, 0.0, point->force);
+  p->volume0[k] = dimension == 3 ? point->volume0 : point->volume0 * point->deformation_gradient[8];
+  for (int n = 0; n < dimension * dimension; n++) {
+    const int c = mpm_component(dimension, n);
+    p->deformation_gradient[c][k] = point->deformation_gradient[c];
+  }
+  for (int n = 0; n < 6; n++) p->stress[n][k] = point->stress[n];
+}
+
+enum { AHEAD = 4 /* points ahead in the rows' order that are fetched */ };
+
+MPM_INLINE void prefetch_point(const MpmPoints *p, int k) {
+  if (k + AHEAD >= p->own) return;
+  const char *next = (const char *)(p->home + p->slot[k + AHEAD]);
+  for (size_t line = 0; line < sizeof(MpmPoint); line += 64) __builtin_prefetch(next + line);
+}
+
+/* 1 if the rows hold these points in this order already. */
+static int is_known(const MpmPoints *p, const MpmPoint *points, int count) {
+  if (!p->has_order || count != p->own) return 0;
+  for (int k = 0; k < count; k++)
+    if (points[p->slot[k]].tag != p->tag[k]) return 0;
+  return 1;
+}
+
+static void find_order(Mpm *mpm, const MpmPoint *points, int count) {
+  MpmPoints *p = &mpm->points;
+  for (int s = 0; s < count; s++) {
+    const MpmPoint *point = &points[s];
+    const MpmVec half = mpm->scene.shape == MPM_SHAPE_GIMP
+                            ? mpm_half_edges(mpm, point->size0, point->deformation_gradient) : mpm_vec_all(0.5);
+    const MpmVec position = vector_of(mpm->scene.dimension, 0.0, point->position);
+    p->item[s] = (MpmItem){mpm_find_cell(mpm, position, half, point->tag), point->tag, s};
+  }
+  mpm_sort_items(&p->item, &p->spare_item, count);
+  for (int k = 0; k < count; k++) p->slot[k] = p->item[k].index, p->key[k] = p->item[k].cell;
   for (int k = 1; k < count; k++)
-    if (p->item[k].cell == p->item[k - 1].cell && p->item[k].tag == p->item[k - 1].tag)
-      return base_error(BASE_ERROR_ARGUMENT, "point %lld: its tag occurs twice; tags must be unique",
-                        (long long)p->item[k].tag);
-  return BASE_OK;
+    if (p->item[k].cell == p->item[k - 1].cell && p->item[k].tag == p->item[k - 1].tag) {
+      mpm_note_error(mpm, base_error(BASE_ERROR_ARGUMENT, "point %lld: its tag occurs twice; tags must be unique",
+                                     (long long)p->item[k].tag));
+      return;
+    }
 }
 
-/* Few points change their cell in a step: only those are sorted, then merged with the rest. */
-BaseStatus mpm_points_sort(Mpm *mpm, const MpmPoint *own) {
+BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count) {
   MpmPoints *p = &mpm->points;
-  const int count = p->own + p->foreign;
+  TRY(mpm_points_reserve(mpm, count));
+  const int known = is_known(p, points, count);
+  p->home = points;
+  p->own = p->live = p->count = count;
+  p->foreign = 0;
+  p->has_stepped = 0;
 #pragma omp parallel for num_threads(mpm->threads) if (count > MPM_PARALLEL_POINTS)
-  for (int s = 0; s < count; s++) p->cell[s] = find_cell(mpm, mpm_slot_point(mpm, own, s));
-
-  const int kept = keep_placed(mpm, own);
-  p->items = 0; /* until the list is whole again */
-  int movers = 0;
-  for (int s = 0; s < count; s++)
-    if (!p->placed[s]) p->mover[movers++] = (MpmItem){p->cell[s], mpm_slot_point(mpm, own, s)->tag, s};
-  if (movers > 0) {
-    merge_sort(&p->mover, &p->spare, movers);
-    merge(p->item, kept, p->mover, movers, p->spare);
-    MpmItem *swap = p->item;
-    p->item = p->spare, p->spare = swap;
+  for (int s = 0; s < count; s++) {
+    BaseStatus status;
+    const char *fault = mpm_find_fault(mpm, &points[s], &status);
+    if (fault) mpm_note_point(mpm, status, points[s].tag, fault);
   }
-  TRY(check_unique(p, count));
-  p->items = count;
-  p->items_own = p->own;
+  p->has_order = mpm->point_tag == INT64_MAX;
+  if (!p->has_order) return BASE_OK;
+  if (!known) {
+    find_order(mpm, points, count);
+    mpm->grid.is_current = 0;
+    p->has_moved = 1;
+  }
+#pragma omp parallel for num_threads(mpm->threads) if (count > MPM_PARALLEL_POINTS)
+  for (int k = 0; k < count; k++) {
+    prefetch_point(p, k);
+    load_own(mpm, k, &points[p->slot[k]]);
+  }
+  double low = INFINITY, high = 0.0;
+  for (int k = 0; k < count; k++) low = fmin(low, p->position[k][0]), high = fmax(high, p->position[k][0]);
+  p->mass_low = low, p->mass_high = high;
   return BASE_OK;
 }
 
-enum { AHEAD = 8 /* points ahead in the sorted order that are fetched */ };
-
-void mpm_points_load(Mpm *mpm, const MpmPoint *own) {
+void mpm_points_load_foreign(Mpm *mpm, const MpmPoint *foreign) {
   MpmPoints *p = &mpm->points;
-  const MpmScene *scene = &mpm->scene;
-  const int has_z = scene->dimension == 3;
-#pragma omp parallel for num_threads(mpm->threads) if (p->count > MPM_PARALLEL_POINTS)
+  const double none[3] = {0.0, 0.0, 0.0};
+  for (int s = 0; s < p->foreign; s++) {
+    const MpmPoint *point = &foreign[s];
+    BaseStatus status;
+    const char *fault = mpm_find_fault(mpm, point, &status);
+    if (fault) mpm_note_point(mpm, status, point->tag, fault);
+    const MpmVec half = p->half ? mpm_half_edges(mpm, point->size0, point->deformation_gradient) : mpm_vec_all(0.5);
+    const MpmVec position = vector_of(mpm->scene.dimension, 0.0, point->position);
+    p->item[s] = (MpmItem){fault ? 0 : mpm_find_cell(mpm, position, half, point->tag), point->tag, s};
+  }
+  mpm_sort_items(&p->item, &p->spare_item, p->foreign);
+  for (int s = 0; s < p->foreign; s++) {
+    const int k = p->own + s;
+    const MpmPoint *point = &foreign[p->item[s].index];
+    p->foreign_slot[s] = p->item[s].index;
+    p->key[k] = p->item[s].cell;
+    load_common(mpm, k, point);
+    p->force[k] = vector_of(3, 0.0, none);
+    if (p->old_position) p->old_position[k] = p->position[k]; /* nobody here moves them */
+    p->mass_low = fmin(p->mass_low, point->mass), p->mass_high = fmax(p->mass_high, point->mass);
+  }
+}
+
+void mpm_points_load_heat(Mpm *mpm, const MpmPoint *foreign) {
+  MpmPoints *p = &mpm->points;
+#pragma omp parallel for num_threads(mpm->threads) if (mpm_is_parallel(mpm))
   for (int k = 0; k < p->count; k++) {
-    const MpmPoint *point = mpm_slot_point(mpm, own, p->item[k].slot);
-    if (k + AHEAD < p->count) {
-      const char *next = (const char *)mpm_slot_point(mpm, own, p->item[k + AHEAD].slot);
-      __builtin_prefetch(next);
-      __builtin_prefetch(next + 64);
-      __builtin_prefetch(next + 128);
-    }
-    for (int i = 0; i < scene->dimension; i++) p->place[k][i] = grid_coordinate(mpm, point, i);
-    p->place[k][3] = point->mass;
-    p->motion[k] = (MpmVec){1.0, point->velocity[0], point->velocity[1], has_z ? point->velocity[2] : 0.0};
-    if (scene->shape == MPM_SHAPE_GIMP)
-      for (int i = 0; i < scene->dimension; i++) p->half[k][i] = half_edge(mpm, point, i);
-    if (scene->transfer == MPM_TRANSFER_APIC) memcpy(p->affine[k], point->affine, sizeof point->affine);
-    if (scene->thermal) {
-      p->heat[k][0] = point->mass * point->heat_capacity;
-      p->heat[k][1] = p->heat[k][0] * point->temperature;
-    }
+    const MpmPoint *point = k < p->own ? &p->home[p->slot[k]] : &foreign[p->foreign_slot[k - p->own]];
+    p->heat[k][0] = point->mass * point->heat_capacity;
+    p->heat[k][1] = p->heat[k][0] * point->temperature;
+  }
+}
+
+/* ----------------------------------------------------------------------------------------------------- reading */
+
+void mpm_row_deformation(const Mpm *mpm, int row, double f[9]) {
+  const MpmPoints *p = &mpm->points;
+  const int dimension = mpm->scene.dimension;
+  if (dimension == 2) memcpy(f, p->home[p->slot[row]].deformation_gradient, 9 * sizeof *f);
+  for (int n = 0; n < dimension * dimension; n++) {
+    const int c = mpm_component(dimension, n);
+    f[c] = p->deformation_gradient[c][row];
+  }
+}
+
+double mpm_row_volume(const Mpm *mpm, int row) {
+  const MpmPoints *p = &mpm->points;
+  double *const *f = p->deformation_gradient;
+  if (mpm->scene.dimension == 2) return p->volume0[row] * (f[0][row] * f[4][row] - f[1][row] * f[3][row]);
+  double full[9];
+  for (int n = 0; n < 9; n++) full[n] = f[n][row];
+  return p->volume0[row] * tensor_determinant(full);
+}
+
+static void write_point(const Mpm *mpm, int k, int what) {
+  const MpmPoints *p = &mpm->points;
+  MpmPoint *point = &p->home[p->slot[k]];
+  const int dimension = mpm->scene.dimension;
+  if (what & MPM_WRITE_MOTION) {
+    for (int i = 0; i < dimension; i++) point->position[i] = p->position[k][1 + i], point->velocity[i] = p->motion[k][1 + i];
+    if (p->affine) memcpy(point->affine, p->affine[k], sizeof point->affine);
+  }
+  if (what & MPM_WRITE_SHAPE) mpm_row_deformation(mpm, k, point->deformation_gradient);
+  if (!(what & MPM_WRITE_LAW)) return;
+  for (int n = 0; n < 6; n++) point->stress[n] = p->stress[n][k];
+  if (!p->has_stepped) return;
+  memset(point->velocity_gradient, 0, sizeof point->velocity_gradient);
+  for (int n = 0; n < dimension * dimension && mpm->scene.mechanical; n++) {
+    const int c = mpm_component(dimension, n);
+    point->velocity_gradient[c] = p->velocity_gradient[c][k];
+  }
+  if (mpm_law_is_local(mpm))
+    mpm->law->describe(mpm->law->content, point->stress, &point->modulus, point->scalars);
+}
+
+void mpm_points_write(const Mpm *mpm, int what) {
+  const MpmPoints *p = &mpm->points;
+  if (!p->has_order) return; /* rows were never filled */
+#pragma omp parallel for num_threads(mpm->threads) if (p->own > MPM_PARALLEL_POINTS)
+  for (int k = 0; k < p->own; k++) {
+    prefetch_point(p, k);
+    write_point(mpm, k, what);
   }
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Shape functions of one axis; products of axes give those of a node. `shape` and `dimension` are constants at every
+/* Shape functions of the axes; products of axes give those of a node. `shape` and `dimension` are constants at every
  * call site, and the functions are always inlined: each combination is compiled by itself, from one source.
  *
  * Lengths are in units of the spacing h: u = (x - origin) / h. The support of a point starts at node `base` and has
@@ -20,29 +20,45 @@ MPM_INLINE double mpm_shape_anchor(MpmShape shape, double u, double half) {
   return shape == MPM_SHAPE_LINEAR ? u : shape == MPM_SHAPE_BSPLINE ? u - 0.5 : u - half;
 }
 
-/* value[a] = S at node base + a, slope[a] = dS/du. uGIMP: mean of the hat function over [f - half, f + half], half <=
- * 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity. */
-MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double value[MPM_WIDTH_MAX],
-                               double slope[MPM_WIDTH_MAX]) {
+/* Four axes at once; lane 0 has no meaning, lanes 1 to 3 are x, y, z. */
+typedef double MpmVec __attribute__((vector_size(32)));
+typedef long long MpmMask __attribute__((vector_size(32)));
+
+MPM_INLINE MpmVec mpm_vec_all(double x) { return (MpmVec){x, x, x, x}; }
+/* x where x > 0, else 0. */
+MPM_INLINE MpmVec mpm_vec_positive(MpmVec x) { return (MpmVec)((MpmMask)x & (x > 0.0)); }
+
+/* value[a] = S at node base + a, slope[a] = dS/du, axis by axis. uGIMP: mean of the hat function over [f - half, f +
+ * half], half <= 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity. */
+MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec value[MPM_WIDTH_MAX],
+                               MpmVec slope[MPM_WIDTH_MAX]) {
   if (shape == MPM_SHAPE_LINEAR) {
     value[0] = 1.0 - f, value[1] = f;
-    slope[0] = -1.0, slope[1] = 1.0;
+    slope[0] = mpm_vec_all(-1.0), slope[1] = mpm_vec_all(1.0);
   } else if (shape == MPM_SHAPE_BSPLINE) {
-    const double left = 1.5 - f, right = f - 0.5;
+    const MpmVec left = 1.5 - f, right = f - 0.5;
     value[0] = 0.5 * left * left, value[2] = 0.5 * right * right;
     slope[0] = -left, slope[2] = right;
     value[1] = 1.0 - value[0] - value[2];
     slope[1] = left - right;
   } else {
-    const double left = 1.0 - (f - half);                                   /* from the domain's left end to node 1 */
-    const double rest = left - 2.0 * half > 0.0 ? left - 2.0 * half : 0.0;  /* of it not covered by the domain */
-    const double right = 2.0 * half - left > 0.0 ? 2.0 * half - left : 0.0; /* of the domain beyond node 1 */
-    const double inverse = 0.5 / half;
+    const MpmVec left = 1.0 - (f - half);                        /* from the domain's left end to node 1 */
+    const MpmVec rest = mpm_vec_positive(left - 2.0 * half);     /* of it not covered by the domain */
+    const MpmVec right = mpm_vec_positive(2.0 * half - left);    /* of the domain beyond node 1 */
+    const MpmVec inverse = 0.5 / half;
     value[0] = 0.5 * inverse * (left - rest) * (left + rest), value[2] = 0.5 * inverse * right * right;
     slope[0] = -inverse * (left - rest), slope[2] = inverse * right;
     value[1] = 1.0 - value[0] - value[2];
     slope[1] = -slope[0] - slope[2];
   }
+}
+
+/* One axis alone. */
+MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double value[MPM_WIDTH_MAX],
+                               double slope[MPM_WIDTH_MAX]) {
+  MpmVec values[MPM_WIDTH_MAX], slopes[MPM_WIDTH_MAX];
+  mpm_shape_axes(shape, mpm_vec_all(f), mpm_vec_all(half), values, slopes);
+  for (int a = 0; a < mpm_shape_width(shape); a++) value[a] = values[a][0], slope[a] = slopes[a][0];
 }
 
 /* APIC: row[a] such that sum_a row[a] v_a is the slope of v over u around the point: S_a d_a / D with d_a = base + a -

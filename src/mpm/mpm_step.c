@@ -97,6 +97,7 @@ static int has_failed(const Mpm *mpm) { return mpm->status != BASE_OK || mpm->po
 static void drop_points_if_failed(Mpm *mpm) {
   if (!has_failed(mpm)) return;
   mpm->points.live = mpm->points.count = 0;
+  mpm->points.has_order = mpm->grid.is_current = 0;
   mpm->grid.cells = mpm->grid.nodes = mpm->grid.slabs[0] = mpm->grid.slabs[1] = 0;
   mpm->contact_count = 0;
 }
@@ -121,30 +122,62 @@ static double halo_reach(const MpmScene *scene) {
   return scene->spacing * (cells + 1e-6);
 }
 
-/* Foreign points, order, active grid. */
-static BaseStatus gather_points(Mpm *mpm, const MpmPoint *points, int count) {
+/* Copies of foreign points. Collective. */
+static BaseStatus gather_foreign(Mpm *mpm, const MpmPoint **foreign) {
   MpmPoints *p = &mpm->points;
-  p->own = p->live = count;
-  p->foreign = 0;
-  if (mpm->halo) {
-    TRY(mpm->halo->begin(mpm->halo->content, points, count, halo_reach(&mpm->scene), &mpm->foreign_points,
-                         &p->foreign));
-    if (p->foreign > INT32_MAX - count)
-      return base_error(BASE_ERROR_MEMORY, "more than %d points on a rank", INT32_MAX);
-  }
-  TRY(mpm_points_reserve(mpm, count + p->foreign));
-  p->count = count + p->foreign;
-  mpm_note_error(mpm, mpm_points_sort(mpm, points));
+  mpm_points_write(mpm, MPM_WRITE_MOTION | (mpm->scene.gimp_stretch ? MPM_WRITE_SHAPE : 0));
+  TRY(mpm->halo->begin(mpm->halo->content, p->home, p->own, halo_reach(&mpm->scene), foreign, &p->foreign));
+  if (p->foreign > INT32_MAX - p->own) return base_error(BASE_ERROR_MEMORY, "more than %d points on a rank", INT32_MAX);
+  return mpm_points_reserve(mpm, p->own + p->foreign);
+}
+
+/* Foreign points, order, active grid. */
+static BaseStatus gather_points(Mpm *mpm) {
+  MpmPoints *p = &mpm->points;
+  const MpmPoint *foreign = NULL;
+  if (mpm->halo) TRY(gather_foreign(mpm, &foreign));
+  p->place = p->position;
+  if (!has_failed(mpm) && mpm->grid.is_current) mpm_note_error(mpm, mpm_points_order(mpm));
+  p->place = p->position;
+  p->count = p->own + p->foreign;
+  if (!has_failed(mpm)) mpm_points_load_foreign(mpm, foreign);
   drop_points_if_failed(mpm);
-  mpm_points_load(mpm, points);
-  TRY(mpm_grid_build(mpm));
+  if (mpm->scene.thermal) mpm_points_load_heat(mpm, foreign);
+  const BaseStatus status = mpm_grid_build(mpm);
+  if (status == BASE_ERROR_MEMORY) return status;
+  mpm_note_error(mpm, status);
+  drop_points_if_failed(mpm);
   return BASE_OK;
 }
+
+/* Values of foreign rows from their owners: vectors (lanes 1 to 3), and tensors unless NULL. Collective. */
+BaseStatus mpm_forward_rows(Mpm *mpm, MpmVec *vector, double (*tensor)[9]) {
+  MpmPoints *p = &mpm->points;
+  const size_t width = tensor ? 12 : 3;
+  for (int k = 0; k < p->live; k++) {
+    double *value = p->carry + width * (size_t)p->slot[k];
+    for (int i = 0; i < 3; i++) value[i] = vector[k][1 + i];
+    if (tensor) memcpy(value + 3, tensor[k], sizeof *tensor);
+  }
+  double *foreign = p->carry + width * (size_t)p->own;
+  TRY(mpm->halo->forward(mpm->halo->content, (int)width, p->carry, foreign));
+  for (int s = 0; s < p->count - p->own; s++) {
+    const double *value = foreign + width * (size_t)p->foreign_slot[s];
+    vector[p->own + s] = (MpmVec){1.0, value[0], value[1], value[2]};
+    if (tensor) memcpy(tensor[p->own + s], value + 3, sizeof *tensor);
+  }
+  return BASE_OK;
+}
+
+/* Sweeps over the nodes. */
+#define FOR_NODES(mpm, n) \
+  _Pragma("omp parallel for num_threads((mpm)->threads) if (mpm_is_parallel(mpm))") \
+  for (int n = 0; n < (mpm)->grid.nodes; n++)
 
 /* state = {0, v_I}, v_I = momentum / mass. */
 static void find_node_velocity(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
-  for (int n = 0; n < grid->nodes; n++) {
+  FOR_NODES(mpm, n) {
     const double mass = grid->sum[n][0], inverse = mass > 0.0 ? 1.0 / mass : 0.0;
     grid->state[n] = inverse * grid->sum[n];
     grid->state[n][0] = 0.0;
@@ -154,7 +187,7 @@ static void find_node_velocity(Mpm *mpm) {
 /* Nodes of almost no mass move with the points' field and carry no force: their acceleration would be noise (B7). */
 static void find_node_acceleration(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
-  for (int n = 0; n < grid->nodes; n++) {
+  FOR_NODES(mpm, n) {
     const double mass = grid->sum[n][0], heat = grid->rate[n][0];
     const double inverse = mass > mpm->scene.mass_cutoff * grid->scale[n] ? 1.0 / mass : 0.0;
     grid->rate[n] = inverse * grid->rate[n];
@@ -163,50 +196,49 @@ static void find_node_acceleration(Mpm *mpm) {
 }
 
 static BaseStatus start_grid(Mpm *mpm) {
-  mpm_p2g_momentum(mpm, mpm->scene.thermal, mpm->scene.transfer == MPM_TRANSFER_APIC);
+  mpm_p2g_momentum(mpm, mpm->points.motion, mpm->scene.thermal, mpm->scene.transfer == MPM_TRANSFER_APIC);
   find_node_velocity(mpm);
-  TRY(mpm_wall_find(mpm));
+  mpm->contact_count = mpm->has_corners = 0;
+  if (mpm->wall_count > 0) {
+    mpm_grid_find_index(mpm);
+    TRY(mpm_wall_find(mpm));
+  }
   if (mpm->scene.thermal) mpm_heat_start(mpm);
   if (mpm->scene.mechanical) mpm_wall_start(mpm);
   return BASE_OK;
 }
 
-/* Forces and heat at the points -> rates at the nodes -> points. */
-static BaseStatus advance(Mpm *mpm, MpmPoint *points) {
-  TRY(mpm_load_finish(mpm, points));
-  mpm_p2g_load(mpm);
+/* Rates at the nodes -> points. */
+static BaseStatus advance(Mpm *mpm) {
   find_node_acceleration(mpm);
   if (mpm->scene.thermal) mpm_heat_update(mpm);
   if (mpm->scene.mechanical) {
     mpm_wall_update(mpm);
     if (mpm->scene.transfer == MPM_TRANSFER_XPIC) TRY(mpm_extended_velocity(mpm));
   }
-  mpm_g2p_update(mpm, points);
+  mpm_g2p_update(mpm);
+  return BASE_OK;
+}
+
+/* Forces and heat at the points -> rates at the nodes. */
+static BaseStatus find_rates(Mpm *mpm) {
+  TRY(mpm_load_fill(mpm));
+  mpm_p2g_load(mpm);
   return BASE_OK;
 }
 
 /* state = updated field; MUSL: the velocity of the updated points instead, at the nodes where they were. */
-static BaseStatus renew_state(Mpm *mpm, const MpmPoint *points) {
+static BaseStatus renew_state(Mpm *mpm) {
   MpmPoints *p = &mpm->points;
   MpmGrid *grid = &mpm->grid;
-  for (int n = 0; n < grid->nodes; n++) grid->state[n] += mpm->dt * grid->rate[n];
+  FOR_NODES(mpm, n) grid->state[n] += mpm->dt * grid->rate[n];
   mpm->state_is_new = 1;
+  p->place = p->old_position;
   if (mpm->scene.order != MPM_ORDER_MUSL) return BASE_OK;
 
-  const int is_affine = mpm->scene.transfer == MPM_TRANSFER_APIC, width = is_affine ? 12 : 3;
-  for (int s = 0; s < p->live; s++) {
-    memcpy(p->carry + (size_t)width * (size_t)s, points[s].velocity, sizeof points[s].velocity);
-    if (is_affine) memcpy(p->carry + 12 * (size_t)s + 3, points[s].affine, sizeof points[s].affine);
-  }
-  if (mpm->halo)
-    TRY(mpm->halo->forward(mpm->halo->content, width, p->carry, p->carry + (size_t)width * (size_t)p->own));
-  for (int k = 0; k < p->count; k++) {
-    const double *v = p->carry + (size_t)width * (size_t)p->item[k].slot;
-    p->motion[k] = (MpmVec){1.0, v[0], v[1], mpm->scene.dimension == 3 ? v[2] : 0.0};
-    if (is_affine) memcpy(p->affine[k], v + 3, sizeof p->affine[k]);
-  }
-  mpm_p2g_momentum(mpm, 0, is_affine);
-  for (int n = 0; n < grid->nodes; n++) {
+  if (mpm->halo) TRY(mpm_forward_rows(mpm, p->motion, p->affine));
+  mpm_p2g_momentum(mpm, p->motion, 0, mpm->scene.transfer == MPM_TRANSFER_APIC);
+  FOR_NODES(mpm, n) {
     const double temperature = grid->state[n][0], mass = grid->sum[n][0];
     grid->state[n] = (mass > 0.0 ? 1.0 / mass : 0.0) * grid->sum[n];
     grid->state[n][0] = temperature;
@@ -218,53 +250,95 @@ static BaseStatus renew_state(Mpm *mpm, const MpmPoint *points) {
 /* ---------------------------------------------------------------------------------------------------- the step */
 
 /* USF (TM-DEMPM fig. 3): the law first, with the velocity of the incoming points. */
-static BaseStatus step_law_first(Mpm *mpm, MpmPoint *points) {
-  const int what =
-      (mpm->scene.mechanical ? MPM_GRADIENT_VELOCITY : 0) | (mpm->scene.thermal ? MPM_GRADIENT_TEMPERATURE : 0);
-  mpm_g2p_gradient(mpm, points, what);
-  TRY(mpm_law_run(mpm, points, mpm->dt, 1));
+static BaseStatus step_law_first(Mpm *mpm) {
+  const int is_fused = mpm_law_is_local(mpm) && !mpm_uses_load(mpm);
+  if (mpm_law_is_local(mpm)) {
+    mpm_stress(mpm, is_fused);
+  } else {
+    if (mpm->scene.mechanical) mpm_g2p_velocity_gradient(mpm);
+    if (mpm->scene.thermal) mpm_g2p_temperature_gradient(mpm);
+    TRY(mpm_law_run(mpm, mpm->dt));
+  }
   drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
-  return advance(mpm, points);
+  if (!is_fused) TRY(find_rates(mpm));
+  return advance(mpm);
 }
 
 /* USL, MUSL: the law last, with the updated velocity. */
-static BaseStatus step_law_last(Mpm *mpm, MpmPoint *points) {
-  if (mpm->scene.thermal) mpm_g2p_gradient(mpm, points, MPM_GRADIENT_TEMPERATURE);
-  mpm_load_fill(mpm, points);
-  TRY(advance(mpm, points));
+static BaseStatus step_law_last(Mpm *mpm) {
+  if (mpm->scene.thermal) mpm_g2p_temperature_gradient(mpm);
+  TRY(find_rates(mpm));
+  TRY(advance(mpm));
   if (mpm->scene.mechanical) {
-    TRY(renew_state(mpm, points));
-    mpm_g2p_gradient(mpm, points, MPM_GRADIENT_VELOCITY);
+    TRY(renew_state(mpm));
+    if (mpm_law_is_local(mpm)) {
+      mpm_stress(mpm, 0);
+      return BASE_OK;
+    }
+    mpm_g2p_velocity_gradient(mpm);
   }
-  return mpm_law_run(mpm, points, mpm->dt, 0);
+  return mpm_law_run(mpm, mpm->dt);
 }
 
-BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt) {
+static BaseStatus check_time_step(double dt) {
   if (!(dt > 0.0 && isfinite(dt)))
     return base_error(BASE_ERROR_ARGUMENT, "time step is %g; allowed: finite and > 0", dt);
+  return BASE_OK;
+}
+
+static BaseStatus check_count(int count) {
   if (count < 0) return base_error(BASE_ERROR_ARGUMENT, "number of points is %d; allowed: >= 0", count);
-  forget_errors(mpm);
+  return BASE_OK;
+}
+
+/* The rows are there, and local errors noted. */
+static BaseStatus step_rows(Mpm *mpm, double dt) {
   mpm->dt = dt;
   mpm->state_is_new = 0;
-  TRY(gather_points(mpm, points, count));
+  TRY(gather_points(mpm));
   TRY(start_grid(mpm));
-  TRY(mpm->scene.order == MPM_ORDER_USF ? step_law_first(mpm, points) : step_law_last(mpm, points));
+  TRY(mpm->scene.order == MPM_ORDER_USF ? step_law_first(mpm) : step_law_last(mpm));
+  mpm->points.has_stepped = 1;
   return report(mpm);
+}
+
+BaseStatus mpm_attach(Mpm *mpm, MpmPoint *points, int count) {
+  TRY(check_count(count));
+  forget_errors(mpm);
+  return mpm_points_attach(mpm, points, count);
+}
+
+BaseStatus mpm_advance(Mpm *mpm, double dt) {
+  TRY(check_time_step(dt));
+  const BaseStatus status = step_rows(mpm, dt);
+  if (status != BASE_OK) mpm->points.has_order = 0;
+  return status;
+}
+
+void mpm_write(const Mpm *mpm) { mpm_points_write(mpm, MPM_WRITE_ALL); }
+
+BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt) {
+  TRY(check_time_step(dt));
+  TRY(mpm_attach(mpm, points, count));
+  TRY(mpm_advance(mpm, dt));
+  mpm_write(mpm);
+  return BASE_OK;
 }
 
 BaseStatus mpm_initialise(Mpm *mpm, MpmPoint *points, int count) {
-  if (count < 0) return base_error(BASE_ERROR_ARGUMENT, "number of points is %d; allowed: >= 0", count);
-  forget_errors(mpm);
-  TRY(mpm_points_reserve(mpm, count));
-  mpm->points.own = mpm->points.live = count;
+  TRY(check_count(count));
   for (int s = 0; s < count; s++) points[s].temperature_mapped = points[s].temperature_law = points[s].temperature;
-  TRY(mpm_law_run(mpm, points, 0.0, 0));
+  TRY(mpm_attach(mpm, points, count));
+  drop_points_if_failed(mpm);
+  TRY(mpm_law_run(mpm, 0.0));
+  mpm_points_write(mpm, MPM_WRITE_LAW);
   return report(mpm);
 }
 
-void mpm_grid_view(const Mpm *mpm, MpmGridView *view) {
+void mpm_grid_view(Mpm *mpm, MpmGridView *view) {
   const MpmGrid *grid = &mpm->grid;
   const double step = mpm->state_is_new ? 0.0 : mpm->dt;
+  mpm_grid_find_index(mpm);
   for (int n = 0; n < grid->nodes; n++) {
     const MpmVec state = grid->state[n] + step * grid->rate[n];
     grid->view_mass[n] = grid->sum[n][0];

@@ -5,8 +5,7 @@
  * direction would turn a body that is free to turn); the tangential components act along their axes. */
 #include <math.h>
 
-#include "../base/tensor.h"
-#include "mpm_core.h"
+#include "mpm_kernel.h"
 
 static int find_cell(const MpmGrid *grid, uint64_t key) {
   int low = 0, high = grid->cells;
@@ -18,11 +17,10 @@ static int find_cell(const MpmGrid *grid, uint64_t key) {
   return low < grid->cells && grid->cell_key[low] == key ? low : -1;
 }
 
-/* 1 if point k of a cell hides the point at `place`: beyond it, within `half_width` to the sides (all over h). */
-static int hides(const Mpm *mpm, const double *other, const double *place, const MpmTraction *traction,
-                 const double half_width[3]) {
+/* 1 if `other` hides the point at `place`: beyond it, within `half_width` (over h) to the sides. */
+static int hides(const Mpm *mpm, MpmVec other, MpmVec place, const MpmTraction *traction, const double half_width[3]) {
   for (int i = 0; i < mpm->scene.dimension; i++) {
-    const double offset = other[i] - place[i];
+    const double offset = (other[1 + i] - place[1 + i]) * mpm->inverse_spacing;
     if (i == traction->axis) {
       const double beyond = traction->side * offset;
       if (!(beyond > half_width[i] && beyond < 1.5)) return 0;
@@ -31,17 +29,21 @@ static int hides(const Mpm *mpm, const double *other, const double *place, const
   return 1;
 }
 
-static int is_hidden_by_cell(const Mpm *mpm, uint64_t key, const double *place, const MpmTraction *traction,
+static int is_hidden_by_cell(const Mpm *mpm, uint64_t key, MpmVec place, const MpmTraction *traction,
                              const double half_width[3]) {
   const int cell = find_cell(&mpm->grid, key);
   if (cell < 0) return 0;
-  for (int k = mpm->grid.cell_first[cell]; k < mpm->grid.cell_first[cell + 1]; k++)
-    if (hides(mpm, mpm->points.place[k], place, traction, half_width)) return 1;
+  const MpmRuns runs = mpm_cell_runs(mpm, cell);
+  for (int r = 0; r < runs.count; r++) {
+    const int *run = runs.run ? runs.run[r] : runs.own;
+    for (int k = run[0]; k < run[1]; k++)
+      if (hides(mpm, mpm->points.position[k], place, traction, half_width)) return 1;
+  }
   return 0;
 }
 
 /* Cells are offset by half a domain (uGIMP), so that a point 1.5 h further lies at most two cells further. */
-static int is_outermost(const Mpm *mpm, uint64_t key, const double *place, const MpmTraction *traction,
+static int is_outermost(const Mpm *mpm, uint64_t key, MpmVec place, const MpmTraction *traction,
                         const double half_width[3]) {
   const int axis = traction->axis, first = (axis + 1) % mpm->scene.dimension, second = (axis + 2) % 3;
   const int depth = mpm->scene.dimension == 3;
@@ -56,23 +58,22 @@ static int is_outermost(const Mpm *mpm, uint64_t key, const double *place, const
   return 1;
 }
 
-static void add_one(Mpm *mpm, const MpmTraction *traction, const MpmPoint *points, MpmVec *load) {
-  const MpmPoints *sorted = &mpm->points;
+static void add_one(Mpm *mpm, const MpmTraction *traction, MpmVec *load) {
+  const MpmPoints *p = &mpm->points;
   const int dimension = mpm->scene.dimension, width = mpm_load_width(mpm);
-  for (int k = 0; k < sorted->count; k++) {
-    const int slot = sorted->item[k].slot;
-    if (slot >= sorted->own) continue;
-    const MpmPoint *point = &points[slot];
-    const double volume = point->volume0 * tensor_determinant(point->deformation_gradient);
-    double half_width[3], area = 0.0, vector[3] = {0.0, 0.0, 0.0}, unused[3];
+  for (int k = 0; k < p->own; k++) {
+    const double volume = mpm_row_volume(mpm, k);
+    double f[9], half_width[3], area = 0.0, vector[3] = {0.0, 0.0, 0.0}, unused[3];
+    mpm_row_deformation(mpm, k, f);
     for (int i = 0; i < dimension; i++) {
       const int is_axis = i == traction->axis;
-      const double normal[3] = {i == 0, i == 1, i == 2}, face = mpm_face_area(point, normal, is_axis ? vector : unused);
+      const double normal[3] = {i == 0, i == 1, i == 2};
+      const double face = mpm_face_area(&p->home[p->slot[k]], f, normal, is_axis ? vector : unused);
       half_width[i] = 0.5 * volume / face * mpm->inverse_spacing;
       if (is_axis) area = face;
     }
-    if (!is_outermost(mpm, sorted->item[k].cell, sorted->place[k], traction, half_width)) continue;
-    MpmVec *force = &load[(size_t)slot * (size_t)width];
+    if (!is_outermost(mpm, p->key[k], p->position[k], traction, half_width)) continue;
+    MpmVec *force = &load[(size_t)k * (size_t)width];
     for (int i = 0; i < dimension; i++) {
       if (i != traction->axis) (*force)[1 + i] += traction->traction[i] * area;
       (*force)[1 + i] += traction->traction[traction->axis] * vector[i];
@@ -80,6 +81,6 @@ static void add_one(Mpm *mpm, const MpmTraction *traction, const MpmPoint *point
   }
 }
 
-void mpm_traction_add(Mpm *mpm, const MpmPoint *points, MpmVec *load) {
-  for (int t = 0; t < mpm->traction_count; t++) add_one(mpm, &mpm->tractions[t], points, load);
+void mpm_traction_add(Mpm *mpm, MpmVec *load) {
+  for (int t = 0; t < mpm->traction_count; t++) add_one(mpm, &mpm->tractions[t], load);
 }

@@ -48,10 +48,10 @@ double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], 
 }
 
 /* Area vectors of a deformed face a: V0 / size_a cof(F) e_a (Nanson), turned to the side of the normal. */
-double mpm_face_area(const MpmPoint *point, const double normal[3], double area[3]) {
+double mpm_face_area(const MpmPoint *point, const double f[9], const double normal[3], double area[3]) {
   double inverse[9], largest = 0.0;
-  tensor_inverse(point->deformation_gradient, inverse);
-  const double volume = point->volume0 * tensor_determinant(point->deformation_gradient);
+  tensor_inverse(f, inverse);
+  const double volume = point->volume0 * tensor_determinant(f);
   area[0] = area[1] = area[2] = 0.0;
   for (int a = 0; a < 3; a++) {
     if (!(point->size0[a] > 0.0)) continue;

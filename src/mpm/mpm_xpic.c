@@ -4,25 +4,11 @@
  * by term. */
 #include "mpm_core.h"
 
-/* Velocities of all sorted points from a nodal field; foreign ones from their owners. Collective. */
+/* Velocities of all points from a nodal field; foreign ones from their owners. Collective. */
 static BaseStatus spread(Mpm *mpm, const MpmVec *field) {
-  MpmPoints *points = &mpm->points;
+  MpmPoints *p = &mpm->points;
   mpm_g2p_velocity(mpm, field);
-  if (mpm->halo) {
-    double *foreign = points->carry + 3 * (size_t)points->own;
-    for (int k = 0; k < points->count; k++)
-      if (points->item[k].slot < points->own)
-        for (int i = 0; i < 3; i++) points->carry[3 * points->item[k].slot + i] = points->gathered[k][1 + i];
-    TRY(mpm->halo->forward(mpm->halo->content, 3, points->carry, foreign));
-  }
-  for (int k = 0; k < points->count; k++) {
-    const int slot = points->item[k].slot;
-    const double *velocity = points->carry + 3 * (size_t)slot;
-    if (slot >= points->own) points->gathered[k] = (MpmVec){0.0, velocity[0], velocity[1], velocity[2]};
-    points->motion[k] = points->gathered[k];
-    points->motion[k][0] = 1.0;
-  }
-  return BASE_OK;
+  return mpm->halo ? mpm_forward_rows(mpm, p->gathered, NULL) : BASE_OK;
 }
 
 BaseStatus mpm_extended_velocity(Mpm *mpm) {
@@ -31,7 +17,7 @@ BaseStatus mpm_extended_velocity(Mpm *mpm) {
   for (int n = 0; n < grid->nodes; n++) grid->extended[n] = m * grid->state[n];
   for (int r = 2; r <= m; r++) {
     TRY(spread(mpm, r == 2 ? grid->state : grid->term));
-    mpm_p2g_momentum(mpm, 0, 0);
+    mpm_p2g_momentum(mpm, mpm->points.gathered, 0, 0);
     /* term r = -(m - r + 1) / r (S+ S) term r-1; term 1 = m v. */
     const double factor = -(double)(m - r + 1) / r * (r == 2 ? m : 1);
     for (int n = 0; n < grid->nodes; n++) {

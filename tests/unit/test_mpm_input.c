@@ -131,7 +131,7 @@ static BaseStatus update_with_nan(void *content, MpmLawBatch *batch) {
 static void a_fault_names_the_lowest_point_within_the_step(void **state) {
   (void)state;
   int64_t bad = 17;
-  MpmLaw law = {"nan", &bad, 0, update_with_nan, NULL};
+  MpmLaw law = {"nan", &bad, 0, update_with_nan, NULL, NULL, NULL};
   MpmScene scene = valid_scene();
   const double low[3] = {0, 0, 0};
   const int number[3] = {6, 6, 1};
