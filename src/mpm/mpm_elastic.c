@@ -15,58 +15,58 @@ typedef struct Elastic {
   double thermal;    /* Pa/K */
 } Elastic;
 
-/* sigma <- R sigma R^T with R = (I - W/2)^-1 (I + W/2), W the spin times dt. */
-MPM_INLINE void rotate(const double spin[3], double stress[6]) {
+/* sigma <- R sigma R^T with R = (I - W/2)^-1 (I + W/2), W the spin times dt. Four points at once, one per lane, as in all
+ * that follows. */
+MPM_INLINE void rotate(const MpmVec spin[3], MpmVec stress[6]) {
   /* spin = (W_zy, W_xz, W_yx): the axial vector w with W a = w x a. R = I + 2/(1+q.q) (Q + Q Q), q = w/2. */
-  const double x = 0.5 * spin[0], y = 0.5 * spin[1], z = 0.5 * spin[2];
-  const double s = 2.0 / (1.0 + (x * x + y * y + z * z));
-  const double r[9] = {1.0 - s * (y * y + z * z), s * (x * y - z), s * (x * z + y),
+  const MpmVec x = 0.5 * spin[0], y = 0.5 * spin[1], z = 0.5 * spin[2];
+  const MpmVec s = 2.0 / (1.0 + (x * x + y * y + z * z));
+  const MpmVec r[9] = {1.0 - s * (y * y + z * z), s * (x * y - z), s * (x * z + y),
                        s * (x * y + z), 1.0 - s * (x * x + z * z), s * (y * z - x),
                        s * (x * z - y), s * (y * z + x), 1.0 - s * (x * x + y * y)};
-  const double full[9] = {stress[TENSOR_XX], stress[TENSOR_XY], stress[TENSOR_XZ],
+  const MpmVec full[9] = {stress[TENSOR_XX], stress[TENSOR_XY], stress[TENSOR_XZ],
                           stress[TENSOR_XY], stress[TENSOR_YY], stress[TENSOR_YZ],
                           stress[TENSOR_XZ], stress[TENSOR_YZ], stress[TENSOR_ZZ]};
-  double left[9];
+  MpmVec left[9];
 #pragma GCC unroll 9
   for (int k = 0; k < 9; k++) {
-    const double *a = r + 3 * (k / 3), *b = full + k % 3;
+    const MpmVec *a = r + 3 * (k / 3), *b = full + k % 3;
     left[k] = a[0] * b[0] + a[1] * b[3] + a[2] * b[6];
   }
 #pragma GCC unroll 6
   for (int k = 0; k < 6; k++) {
     const int row = k < 3 ? k : k == 5 ? 1 : 0, column = k < 3 ? k : k == 3 ? 1 : 2;
-    const double *a = left + 3 * row, *b = r + 3 * column;
+    const MpmVec *a = left + 3 * row, *b = r + 3 * column;
     stress[k] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   }
 }
 
 /* D dt and the spin's axial vector times dt from L. */
-MPM_INLINE void increments(const double *l, double dt, double strain[6], double spin[3]) {
+MPM_INLINE void increments(const MpmVec *l, double dt, MpmVec strain[6], MpmVec spin[3]) {
   strain[TENSOR_XX] = dt * l[0], strain[TENSOR_YY] = dt * l[4], strain[TENSOR_ZZ] = dt * l[8];
   strain[TENSOR_XY] = 0.5 * dt * (l[1] + l[3]), strain[TENSOR_XZ] = 0.5 * dt * (l[2] + l[6]);
   strain[TENSOR_YZ] = 0.5 * dt * (l[5] + l[7]);
   spin[0] = 0.5 * dt * (l[7] - l[5]), spin[1] = 0.5 * dt * (l[2] - l[6]), spin[2] = 0.5 * dt * (l[3] - l[1]);
 }
 
-static void update_bar(const Elastic *law, const double strain[6], double heating, double stress[6]) {
-  const double axial = stress[TENSOR_XX] + law->given.young * strain[TENSOR_XX] - law->thermal * heating;
-  memset(stress, 0, 6 * sizeof *stress);
-  stress[TENSOR_XX] = axial;
-}
-
-static void update_stress(const Elastic *law, const double *l, double dt, double heating, double stress[6]) {
-  double strain[6], spin[3];
+MPM_INLINE void update_stress(const Elastic *law, MpmElasticMode mode, const MpmVec *l, double dt, double heating,
+                              MpmVec stress[6]) {
+  MpmVec strain[6], spin[3];
+  const MpmVec zero = mpm_vec_all(0.0);
   increments(l, dt, strain, spin);
-  if (law->given.mode == MPM_ELASTIC_BAR) {
-    update_bar(law, strain, heating, stress);
+  if (mode == MPM_ELASTIC_BAR) {
+    stress[TENSOR_XX] += law->given.young * strain[TENSOR_XX] - law->thermal * heating;
+#pragma GCC unroll 6
+    for (int k = 1; k < 6; k++) stress[k] = zero;
     return;
   }
-  const int is_plane_stress = law->given.mode == MPM_ELASTIC_PLANE_STRESS;
+  const int is_plane_stress = mode == MPM_ELASTIC_PLANE_STRESS;
   rotate(spin, stress);
-  const double trace = strain[TENSOR_XX] + strain[TENSOR_YY] + (is_plane_stress ? 0.0 : strain[TENSOR_ZZ]);
-  const double all = law->lambda * trace - law->thermal * heating;
-  for (int k = 0; k < 6; k++) stress[k] += 2.0 * law->mu * strain[k] + (k < 3 ? all : 0.0);
-  if (is_plane_stress) stress[TENSOR_ZZ] = stress[TENSOR_XZ] = stress[TENSOR_YZ] = 0.0;
+  const MpmVec trace = strain[TENSOR_XX] + strain[TENSOR_YY] + (is_plane_stress ? zero : strain[TENSOR_ZZ]);
+  const MpmVec all = law->lambda * trace - law->thermal * heating;
+#pragma GCC unroll 6
+  for (int k = 0; k < 6; k++) stress[k] += k < 3 ? 2.0 * law->mu * strain[k] + all : 2.0 * law->mu * strain[k];
+  if (is_plane_stress) stress[TENSOR_ZZ] = stress[TENSOR_XZ] = stress[TENSOR_YZ] = zero;
 }
 
 /* 1/2 sigma : C^-1 : sigma, J/m3. One form serves all modes: stress components that a mode frees are 0. */
@@ -81,60 +81,46 @@ static double wave_modulus(const Elastic *law) {
 }
 
 /* The same in the plane, where xz and yz are 0 and stay so. */
-MPM_INLINE void update_plane(const Elastic *law, double lambda, double out_of_plane, const double l[9], double dt,
-                             double s[4]) {
-  const double xx = dt * l[0], yy = dt * l[4], xy = 0.5 * dt * (l[1] + l[3]), spin = 0.25 * dt * (l[3] - l[1]);
-  const double twice = 2.0 / (1.0 + spin * spin), c = 1.0 - twice * (spin * spin), r = twice * spin;
-  const double left[4] = {c * s[0] - r * s[3], c * s[3] - r * s[1], r * s[0] + c * s[3], r * s[3] + c * s[1]};
-  const double all = lambda * (xx + yy), mu = 2.0 * law->mu;
+MPM_INLINE void update_plane(const Elastic *law, const MpmVec l[9], double dt, MpmVec s[4]) {
+  const MpmVec xx = dt * l[0], yy = dt * l[4], xy = 0.5 * dt * (l[1] + l[3]), q = 0.25 * dt * (l[3] - l[1]);
+  const MpmVec twice = 2.0 / (1.0 + q * q), c = 1.0 - twice * (q * q), r = twice * q;
+  const MpmVec left[4] = {c * s[0] - r * s[3], c * s[3] - r * s[1], r * s[0] + c * s[3], r * s[3] + c * s[1]};
+  const MpmVec all = law->lambda * (xx + yy);
+  const double mu = 2.0 * law->mu;
   s[0] = left[0] * c - left[1] * r + (mu * xx + all);
   s[1] = left[2] * r + left[3] * c + (mu * yy + all);
-  s[2] = out_of_plane * (s[2] + all);
+  s[2] = law->given.mode == MPM_ELASTIC_PLANE_STRESS ? mpm_vec_all(0.0) : s[2] + all;
   s[3] = left[0] * r + left[1] * c + mu * xy;
 }
 
-/* One mode per loop, so that it runs in vectors. */
-MPM_INLINE void advance_plane(const Elastic *law, double out_of_plane, const MpmLawRows *rows) {
-  const double *l0 = rows->velocity_gradient[0], *l1 = rows->velocity_gradient[1], *l3 = rows->velocity_gradient[3];
-  const double *l4 = rows->velocity_gradient[4], dt = rows->dt;
-  double *s0 = rows->stress[0], *s1 = rows->stress[1], *s2 = rows->stress[2], *s3 = rows->stress[3];
-#pragma omp simd
-  for (int p = 0; p < rows->n; p++) {
-    const double l[9] = {l0[p], l1[p], 0.0, l3[p], l4[p], 0.0, 0.0, 0.0, 0.0};
-    double s[4] = {s0[p], s1[p], s2[p], s3[p]};
-    update_plane(law, law->lambda, out_of_plane, l, dt, s);
-    s0[p] = s[0], s1[p] = s[1], s2[p] = s[2], s3[p] = s[3];
-  }
-}
-
-MPM_INLINE void advance_space(const Elastic *law, const MpmLawRows *rows) {
-  const double dt = rows->dt;
-#pragma omp simd
-  for (int p = 0; p < rows->n; p++) {
-    double l[9], s[6], strain[6], spin[3];
+MPM_INLINE void advance_four(const Elastic *law, MpmElasticMode mode, const MpmLawRows *rows, int p, int is_plane,
+                             int n) {
+  MpmVec l[9], s[6];
 #pragma GCC unroll 9
-    for (int n = 0; n < 9; n++) l[n] = rows->velocity_gradient[n][p];
+  for (int k = 0; k < 9; k++)
+    l[k] = is_plane && !(k < 5 && k != 2) ? mpm_vec_all(0.0) : mpm_vec_load(rows->velocity_gradient[k] + p, n);
 #pragma GCC unroll 6
-    for (int n = 0; n < 6; n++) s[n] = rows->stress[n][p];
-    increments(l, dt, strain, spin);
-    rotate(spin, s);
-    const double all = law->lambda * (strain[TENSOR_XX] + strain[TENSOR_YY] + strain[TENSOR_ZZ]);
+  for (int k = 0; k < 6; k++) s[k] = mpm_vec_load(rows->stress[k] + p, n);
+  if (is_plane && mode != MPM_ELASTIC_BAR) update_plane(law, l, rows->dt, s);
+  else update_stress(law, mode, l, rows->dt, 0.0, s);
 #pragma GCC unroll 6
-    for (int n = 0; n < 6; n++) rows->stress[n][p] = s[n] + (2.0 * law->mu * strain[n] + (n < 3 ? all : 0.0));
-  }
+  for (int k = 0; k < 6; k++)
+    if (k < 4 || !is_plane || mode == MPM_ELASTIC_BAR) mpm_vec_store(s[k], rows->stress[k] + p, n);
 }
 
-MPM_INLINE void advance_bar(const Elastic *law, const MpmLawRows *rows) {
-  for (int p = 0; p < rows->n; p++)
-    rows->stress[TENSOR_XX][p] += law->given.young * (rows->dt * rows->velocity_gradient[0][p]);
-  for (int n = 1; n < 6; n++) memset(rows->stress[n], 0, (size_t)rows->n * sizeof(double));
+MPM_INLINE void advance_mode(const Elastic *law, MpmElasticMode mode, const MpmLawRows *rows, int is_plane) {
+  int p = 0;
+  for (; p + 4 <= rows->n; p += 4) advance_four(law, mode, rows, p, is_plane, 4);
+  if (p < rows->n) advance_four(law, mode, rows, p, is_plane, rows->n - p);
 }
 
 MPM_CLONES static void elastic_advance(const void *content, const MpmLawRows *rows) {
   const Elastic *law = content;
-  if (law->given.mode == MPM_ELASTIC_BAR) advance_bar(law, rows);
-  else if (rows->dimension == 3) advance_space(law, rows);
-  else advance_plane(law, law->given.mode == MPM_ELASTIC_PLANE_STRESS ? 0.0 : 1.0, rows);
+  const MpmElasticMode mode = law->given.mode;
+  if (mode == MPM_ELASTIC_BAR) advance_mode(law, MPM_ELASTIC_BAR, rows, rows->dimension == 2);
+  else if (rows->dimension == 2) advance_mode(law, MPM_ELASTIC_PLANE_STRAIN, rows, 1);
+  else if (mode == MPM_ELASTIC_PLANE_STRESS) advance_mode(law, MPM_ELASTIC_PLANE_STRESS, rows, 0);
+  else advance_mode(law, MPM_ELASTIC_3D, rows, 0);
 }
 
 static void elastic_describe(const void *content, const double stress[6], double *modulus,
@@ -145,6 +131,15 @@ static void elastic_describe(const void *content, const double stress[6], double
   scalars[MPM_LAW_ENERGY_DENSITY] = energy_density(&law->given, stress);
 }
 
+/* One point, in all lanes. */
+static void update_point(const Elastic *law, const double l[9], double dt, double heating, double stress[6]) {
+  MpmVec gradient[9], s[6];
+  for (int k = 0; k < 9; k++) gradient[k] = mpm_vec_all(l[k]);
+  for (int k = 0; k < 6; k++) s[k] = mpm_vec_all(stress[k]);
+  update_stress(law, law->given.mode, gradient, dt, heating, s);
+  for (int k = 0; k < 6; k++) stress[k] = s[k][0];
+}
+
 static BaseStatus elastic_update(void *content, MpmLawBatch *batch) {
   const Elastic *law = content;
   const int n = batch->n;
@@ -152,7 +147,7 @@ static BaseStatus elastic_update(void *content, MpmLawBatch *batch) {
   for (int p = 0; p < n; p++) {
     const double heating = law->given.thermal ? batch->temperature_rate[p] * batch->dt : 0.0;
     double *stress = batch->stress + 6 * (size_t)p, *scalars = batch->scalars + MPM_LAW_SCALARS * (size_t)p;
-    if (batch->dt > 0.0) update_stress(law, batch->velocity_gradient + 9 * (size_t)p, batch->dt, heating, stress);
+    if (batch->dt > 0.0) update_point(law, batch->velocity_gradient + 9 * (size_t)p, batch->dt, heating, stress);
     elastic_describe(law, stress, &batch->modulus[p], scalars);
     if (!law->given.thermal) continue;
     batch->heat[p] = 0.0;

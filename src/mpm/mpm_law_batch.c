@@ -4,68 +4,79 @@
 #include <math.h>
 #include <string.h>
 
-#include "../base/tensor.h"
 #include "mpm_deform.h"
 #include "mpm_kernel.h"
 
 /* -------------------------------------------------------------------------------------------- deformation, rows */
 
-MPM_INLINE void get_row(double *const *component, int k, int dimension, double a[9]) {
+/* Calls body(arguments, n) for four rows at a time from k on, n of them; the usual n is a constant. */
+#define BY_FOUR(k, first, end, body, ...)                                       \
+  do {                                                                          \
+    int k = (first);                                                            \
+    for (; k + 4 <= (end); k += 4) body(__VA_ARGS__, 4);                        \
+    if (k < (end)) body(__VA_ARGS__, (end) - k);                                \
+  } while (0)
+
+MPM_INLINE void get_rows(double *const *component, int k, int dimension, MpmVec a[9], int n) {
 #pragma GCC unroll 9
-  for (int n = 0; n < dimension * dimension; n++)
-    a[mpm_component(dimension, n)] = component[mpm_component(dimension, n)][k];
+  for (int c = 0; c < 9; c++)
+    if (dimension == 3 || (c < 5 && c != 2)) a[c] = mpm_vec_load(component[c] + k, n);
 }
 
-/* Without a large increment the loop has no branch and runs in vectors. */
-MPM_INLINE void deform_body(Mpm *mpm, int first, int end, double dt, int dimension) {
-  double *const *gradient = mpm->points.velocity_gradient, *const *deformation = mpm->points.deformation_gradient;
-  double *lp[9], *fp[9];
-  for (int n = 0; n < dimension * dimension; n++) {
-    const int c = mpm_component(dimension, n);
-    lp[c] = gradient[c], fp[c] = deformation[c];
-  }
-  double large = 0.0;
-#pragma omp simd reduction(+ : large)
-  for (int k = first; k < end; k++) {
-    double l[9];
-    get_row(lp, k, dimension, l);
-    large += (dimension == 2 ? mpm_is_small_plane(l, dt) : mpm_is_small_space(l, dt)) ? 0.0 : 1.0;
-  }
-  if (large == 0.0) {
-#pragma omp simd
-    for (int k = first; k < end; k++) {
-      double l[9], f[9];
-      get_row(lp, k, dimension, l), get_row(fp, k, dimension, f);
-      if (dimension == 2) mpm_deform_small_plane(l, dt, f);
-      else mpm_deform_small_space(l, dt, f);
-#pragma GCC unroll 9
-      for (int n = 0; n < dimension * dimension; n++) fp[mpm_component(dimension, n)][k] = f[mpm_component(dimension, n)];
+/* The lanes with large increments, one by one. */
+static void deform_large(Mpm *mpm, int k, double dt, MpmMask small, int n) {
+  MpmPoints *p = &mpm->points;
+  const int dimension = mpm->scene.dimension;
+  for (int i = 0; i < n; i++) {
+    double l[9] = {0.0}, f[9] = {0.0};
+    if (small[i]) continue;
+    for (int q = 0; q < dimension * dimension; q++) {
+      const int c = mpm_component(dimension, q);
+      l[c] = p->velocity_gradient[c][k + i], f[c] = p->deformation_gradient[c][k + i];
     }
-    return;
+    mpm_deform_large(l, dt, dimension, f);
+    for (int q = 0; q < dimension * dimension; q++)
+      p->deformation_gradient[mpm_component(dimension, q)][k + i] = f[mpm_component(dimension, q)];
   }
-  for (int k = first; k < end; k++) {
-    double l[9], f[9];
-    get_row(lp, k, dimension, l), get_row(fp, k, dimension, f);
-    if (dimension == 2) mpm_deform_plane(l, dt, f);
-    else mpm_deform_space(l, dt, f);
-    for (int n = 0; n < dimension * dimension; n++) fp[mpm_component(dimension, n)][k] = f[mpm_component(dimension, n)];
+}
+
+MPM_INLINE void deform_four(Mpm *mpm, int k, double dt, int dimension, int n) {
+  double *const *deformation = mpm->points.deformation_gradient;
+  MpmVec l[9], f[9], old[9];
+  get_rows(mpm->points.velocity_gradient, k, dimension, l, n);
+  get_rows(deformation, k, dimension, f, n);
+  const MpmMask small = dimension == 2 ? mpm_is_small_plane(l, dt) : mpm_is_small_space(l, dt);
+  const int all_small = mpm_mask_all(small);
+#pragma GCC unroll 9
+  for (int c = 0; c < 9; c++)
+    if (dimension == 3 || (c < 5 && c != 2)) old[c] = f[c];
+  if (dimension == 2) mpm_deform_small_plane(l, dt, f);
+  else mpm_deform_small_space(l, dt, f);
+#pragma GCC unroll 9
+  for (int c = 0; c < 9; c++) {
+    if (!(dimension == 3 || (c < 5 && c != 2))) continue;
+    if (!all_small) f[c] = (MpmVec)(((MpmMask)f[c] & small) | ((MpmMask)old[c] & ~small));
+    mpm_vec_store(f[c], deformation[c] + k, n);
   }
+  if (!all_small) deform_large(mpm, k, dt, small, n);
 }
 
 MPM_CLONES static void deform_rows(Mpm *mpm, int first, int end, double dt) {
-  if (mpm->scene.dimension == 2) deform_body(mpm, first, end, dt, 2);
-  else deform_body(mpm, first, end, dt, 3);
+  if (mpm->scene.dimension == 2) BY_FOUR(k, first, end, deform_four, mpm, k, dt, 2);
+  else BY_FOUR(k, first, end, deform_four, mpm, k, dt, 3);
+}
+
+MPM_INLINE void check_four(double *const *s, int k, MpmVec *fault, int n) {
+  MpmVec sum = mpm_vec_load(s[0] + k, n);
+  for (int c = 1; c < 6; c++) sum += mpm_vec_load(s[c] + k, n);
+  *fault += sum - sum; /* 0, or NaN */
 }
 
 MPM_CLONES static void check_rows(Mpm *mpm, int first, int end) {
   double *const *s = mpm->points.stress;
-  double fault = 0.0;
-#pragma omp simd reduction(+ : fault)
-  for (int k = first; k < end; k++) {
-    const double sum = s[0][k] + s[1][k] + s[2][k] + s[3][k] + s[4][k] + s[5][k];
-    fault += sum - sum; /* 0, or NaN */
-  }
-  if (fault == 0.0) return;
+  MpmVec fault = {0.0, 0.0, 0.0, 0.0};
+  BY_FOUR(k, first, end, check_four, s, k, &fault);
+  if (mpm_mask_all(fault == 0.0)) return;
   for (int k = first; k < end; k++)
     if (!isfinite(s[0][k] + s[1][k] + s[2][k] + s[3][k] + s[4][k] + s[5][k]))
       mpm_note_point(mpm, BASE_ERROR_UNSTABLE, mpm->points.tag[k], "stress is not finite");
@@ -90,7 +101,8 @@ static void fill_row(Mpm *mpm, int k, double dt) {
   double *gradient = p->law_velocity_gradient + 9 * (size_t)s;
   p->law_tag[s] = point->tag;
   memset(gradient, 0, 9 * sizeof *gradient);
-  if (mpm->scene.mechanical && dt > 0.0) get_row(p->velocity_gradient, k, dimension, gradient);
+  for (int n = 0; n < dimension * dimension && mpm->scene.mechanical && dt > 0.0; n++)
+    gradient[mpm_component(dimension, n)] = p->velocity_gradient[mpm_component(dimension, n)][k];
   mpm_row_deformation(mpm, k, p->law_deformation_gradient + 9 * (size_t)s);
   for (int n = 0; n < 6; n++) p->batch.stress[6 * (size_t)s + (size_t)n] = p->stress[n][k];
   if (!mpm->scene.thermal && !mpm->law->thermal) return;

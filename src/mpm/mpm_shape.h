@@ -25,6 +25,19 @@ typedef double MpmVec __attribute__((vector_size(32)));
 typedef long long MpmMask __attribute__((vector_size(32)));
 
 MPM_INLINE MpmVec mpm_vec_all(double x) { return (MpmVec){x, x, x, x}; }
+MPM_INLINE int mpm_mask_all(MpmMask mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
+/* Four rows of an array, of which `n` (1 to 4) exist: the others repeat the last one and are not written. */
+MPM_INLINE MpmVec mpm_vec_load(const double *row, int n) {
+  MpmVec result;
+  if (n < 4) return (MpmVec){row[0], row[n > 1 ? 1 : 0], row[n > 2 ? 2 : n - 1], row[n - 1]};
+  __builtin_memcpy(&result, row, sizeof result);
+  return result;
+}
+MPM_INLINE void mpm_vec_store(MpmVec x, double *row, int n) {
+  if (n < 4)
+    for (int i = 0; i < n; i++) row[i] = x[i];
+  else __builtin_memcpy(row, &x, sizeof x);
+}
 /* x where x > 0, else 0. */
 MPM_INLINE MpmVec mpm_vec_positive(MpmVec x) { return (MpmVec)((MpmMask)x & (x > 0.0)); }
 

@@ -85,8 +85,6 @@ MPM_INLINE MpmMask stays(const Mpm *mpm, int k, MpmVec origin, MpmVec base, MpmM
   return (((anchor >= base) & (anchor < base + 1.0)) | ignore) & (sum - sum == 0.0);
 }
 
-static int all(MpmMask mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
-
 /* Marks the rows of some cells that leave. Returns how many. */
 MPM_CLONES static int mark_movers(Mpm *mpm, int first, int end) {
   MpmPoints *p = &mpm->points;
@@ -102,9 +100,9 @@ MPM_CLONES static int mark_movers(Mpm *mpm, int first, int end) {
     MpmMask stay = none;
     for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++)
       stay &= stays(mpm, k, origin, base, ignore);
-    if (all(stay)) continue;
+    if (mpm_mask_all(stay)) continue;
     for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++) {
-      p->moves[k] = !all(stays(mpm, k, origin, base, ignore));
+      p->moves[k] = !mpm_mask_all(stays(mpm, k, origin, base, ignore));
       movers += p->moves[k];
     }
   }

@@ -85,7 +85,7 @@ static void deformation_equals_the_exponential_and_does_not_drift(void **state) 
     double l[9], plane[9], f[9], g[9], e[9], expected[9];
     for (int k = 0; k < 9; k++) l[k] = size * (2.0 * base_random(&seed) - 1.0);
     tensor_identity(f);
-    mpm_deform_space(l, 1.0, f);
+    mpm_deform(l, 1.0, 3, f);
     tensor_exponential(l, 1.0, e);
     for (int k = 0; k < 9; k++) AT_MOST(fabs(f[k] - e[k]), 1e-14 * fmax(1.0, e[0] + e[4] + e[8] + 10.0 * size));
     memcpy(plane, l, sizeof l);
@@ -94,7 +94,7 @@ static void deformation_equals_the_exponential_and_does_not_drift(void **state) 
     g[2] = g[5] = 0.0;
     tensor_exponential(plane, 1.0, e);
     tensor_multiply(e, g, expected);
-    mpm_deform_plane(plane, 1.0, g);
+    mpm_deform(plane, 1.0, 2, g);
     for (int k = 0; k < 9; k++)
       AT_MOST(fabs(g[k] - expected[k]),
               3e-14 * fmax(1.0, expected[0] * expected[0] + expected[4] * expected[4] + size * 10.0));
@@ -103,7 +103,7 @@ static void deformation_equals_the_exponential_and_does_not_drift(void **state) 
   tensor_identity(f), tensor_identity(h);
   const double turn = 2.0 * PI / 1000, spin[9] = {0, -turn, 0, turn, 0, 0, 0, 0, 0};
   const double solid[9] = {0, -0.6 * turn, 0.64 * turn, 0.6 * turn, 0, -0.48 * turn, -0.64 * turn, 0.48 * turn, 0};
-  for (int s = 0; s < 1000; s++) mpm_deform_plane(spin, 1.0, f), mpm_deform_space(solid, 1.0, h);
+  for (int s = 0; s < 1000; s++) mpm_deform(spin, 1.0, 2, f), mpm_deform(solid, 1.0, 3, h);
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) AT_MOST(fabs(f[3 * i + j] - (i == j)), 1e-12); /* A4 */
   AT_MOST(fabs(tensor_determinant(f) - 1.0), 1e-12);
