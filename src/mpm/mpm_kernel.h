@@ -68,8 +68,11 @@ MPM_INLINE double mpm_across(const MpmVec *y, const MpmVec *z, int r, int dimens
 
 MPM_INLINE MpmVec mpm_gather_value(const MpmVec *field, const int *row, const MpmWeights *w, int dimension, int width) {
   MpmVec value = {0.0, 0.0, 0.0, 0.0};
-  for (int r = 0; r < (dimension == 3 ? width * width : width); r++) {
+  const int rows = dimension == 3 ? width * width : width;
+#pragma GCC unroll 9
+  for (int r = 0; r < rows; r++) {
     MpmVec along = {0.0, 0.0, 0.0, 0.0};
+#pragma GCC unroll 3
     for (int a = 0; a < width; a++) along += w->value[a][1] * field[row[r] + a];
     value += mpm_across(w->value, w->value, r, dimension, width) * along;
   }
@@ -80,8 +83,11 @@ MPM_INLINE MpmVec mpm_gather_value(const MpmVec *field, const int *row, const Mp
 MPM_INLINE void mpm_gather_gradient(const MpmVec *field, const int *row, const MpmWeights *w, const MpmVec *slope,
                                     int dimension, int width, MpmVec gradient[3]) {
   for (int j = 0; j < 3; j++) gradient[j] = (MpmVec){0.0, 0.0, 0.0, 0.0};
-  for (int r = 0; r < (dimension == 3 ? width * width : width); r++) {
+  const int rows = dimension == 3 ? width * width : width;
+#pragma GCC unroll 9
+  for (int r = 0; r < rows; r++) {
     MpmVec along = {0.0, 0.0, 0.0, 0.0}, across = {0.0, 0.0, 0.0, 0.0};
+#pragma GCC unroll 3
     for (int a = 0; a < width; a++) {
       along += w->value[a][1] * field[row[r] + a];
       across += slope[a][1] * field[row[r] + a];

@@ -18,17 +18,23 @@ MPM_INLINE void add_affine(const Mpm *mpm, int k, const MpmWeights *w, int dimen
   MpmVec column[3];
   for (int j = 0; j < dimension; j++)
     column[j] = factor * (MpmVec){0.0, affine[j], affine[3 + j], dimension == 3 ? affine[6 + j] : 0.0};
-  for (int r = 0; r < (dimension == 3 ? width * width : width); r++) {
+  const int rows = dimension == 3 ? width * width : width;
+#pragma GCC unroll 9
+  for (int r = 0; r < rows; r++) {
     const double weight = mpm_across(w->value, w->value, r, dimension, width);
     MpmVec row = (r % width - w->f[2]) * column[1];
     if (dimension == 3) row += (r / width - w->f[3]) * column[2];
+#pragma GCC unroll 3
     for (int a = 0; a < width; a++) sum[r * width + a] += (w->value[a][1] * weight) * (row + (a - w->f[1]) * column[0]);
   }
 }
 
 MPM_INLINE void add_heat(const double content[2], const MpmWeights *w, int dimension, int width, double (*heat)[2]) {
-  for (int r = 0; r < (dimension == 3 ? width * width : width); r++) {
+  const int rows = dimension == 3 ? width * width : width;
+#pragma GCC unroll 9
+  for (int r = 0; r < rows; r++) {
     const double weight = mpm_across(w->value, w->value, r, dimension, width);
+#pragma GCC unroll 3
     for (int a = 0; a < width; a++)
       for (int q = 0; q < 2; q++) heat[r * width + a][q] += w->value[a][1] * weight * content[q];
   }
@@ -40,8 +46,10 @@ MPM_INLINE void momentum_row(const Mpm *mpm, const MpmVec *motion, int k, const 
   MpmWeights w;
   mpm_find_weights(mpm, k, base, shape, &w);
   const MpmVec value = mpm->points.position[k][0] * motion[k];
+#pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {
     const MpmVec row = mpm_across(w.value, w.value, r, dimension, width) * value;
+#pragma GCC unroll 3
     for (int a = 0; a < width; a++) sum[r * width + a] += w.value[a][1] * row;
   }
   if (extras.with_affine) add_affine(mpm, k, &w, dimension, width, sum);
@@ -52,10 +60,12 @@ MPM_INLINE void momentum_body(Mpm *mpm, const MpmVec *motion, const int range[2]
                               MpmShape shape) {
   MpmGrid *grid = &mpm->grid;
   const int width = mpm_shape_width(shape), rows = dimension == 3 ? width * width : width;
+  const int nodes = rows * width;
   for (int cell = range[0]; cell < range[1]; cell++) {
     MpmVec sum[MPM_NODES_MAX];
     double heat[MPM_NODES_MAX][2];
-    for (int n = 0; n < rows * width; n++) sum[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
+#pragma GCC unroll 27
+    for (int n = 0; n < nodes; n++) sum[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
     if (extras.with_heat) memset(heat, 0, sizeof heat);
     const MpmCellBase base = mpm_cell_base(mpm, cell, dimension);
     const MpmRuns runs = mpm_cell_runs(mpm, cell);
@@ -63,7 +73,9 @@ MPM_INLINE void momentum_body(Mpm *mpm, const MpmVec *motion, const int range[2]
       const int *run = runs.run ? runs.run[r] : runs.own;
       for (int k = run[0]; k < run[1]; k++) momentum_row(mpm, motion, k, &base, extras, dimension, shape, sum, heat);
     }
+#pragma GCC unroll 9
     for (int r = 0; r < rows; r++)
+#pragma GCC unroll 3
       for (int a = 0; a < width; a++) {
         const int n = grid->cell_row[cell][r] + a;
         grid->sum[n] += sum[r * width + a];
@@ -107,11 +119,13 @@ MPM_INLINE void load_row(const Mpm *mpm, int k, const MpmVec *load, const MpmCel
   const int width = mpm_shape_width(shape), rows = dimension == 3 ? width * width : width;
   MpmWeights w;
   mpm_find_weights(mpm, k, base, shape, &w);
+#pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {
     const double weight = mpm_across(w.value, w.value, r, dimension, width);
     MpmVec even = weight * load[0] + mpm_across(w.slope, w.value, r, dimension, width) * load[2];
     if (dimension == 3) even += mpm_across(w.value, w.slope, r, dimension, width) * load[3];
     const MpmVec odd = weight * load[1];
+#pragma GCC unroll 3
     for (int a = 0; a < width; a++) sum[r * width + a] += w.value[a][1] * even + w.slope[a][1] * odd;
   }
 }
@@ -119,9 +133,11 @@ MPM_INLINE void load_row(const Mpm *mpm, int k, const MpmVec *load, const MpmCel
 MPM_INLINE void load_body(Mpm *mpm, int first, int end, const MpmVec *given, int dimension, MpmShape shape) {
   MpmGrid *grid = &mpm->grid;
   const int width = mpm_shape_width(shape), rows = dimension == 3 ? width * width : width;
+  const int nodes = rows * width;
   for (int cell = first; cell < end; cell++) {
     MpmVec sum[MPM_NODES_MAX];
-    for (int n = 0; n < rows * width; n++) sum[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
+#pragma GCC unroll 27
+    for (int n = 0; n < nodes; n++) sum[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
     const MpmCellBase base = mpm_cell_base(mpm, cell, dimension);
     const MpmRuns runs = mpm_cell_runs(mpm, cell);
     for (int r = 0; r < runs.count; r++) {
@@ -132,7 +148,9 @@ MPM_INLINE void load_body(Mpm *mpm, int first, int end, const MpmVec *given, int
         load_row(mpm, k, given ? given + (size_t)k * (size_t)(1 + dimension) : load, &base, dimension, shape, sum);
       }
     }
+#pragma GCC unroll 9
     for (int r = 0; r < rows; r++)
+#pragma GCC unroll 3
       for (int a = 0; a < width; a++) grid->rate[grid->cell_row[cell][r] + a] += sum[r * width + a];
   }
 }
