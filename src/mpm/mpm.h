@@ -95,11 +95,16 @@ MpmWall mpm_wall_default(void);
 BaseStatus mpm_wall_check(const MpmWall *wall, int dimension, int thermal);
 
 /* Traction on the current outermost layer of points along +axis or -axis (errata A.6): each gets t V_p / h, h its own
- * width. The component along the axis acts along the current normal of the point's face, as a pressure does. */
+ * width. The component along the axis acts along the current normal of the point's face, as a pressure does.
+ * Or, with `surface`, a pressure on the whole surface of the body: by the divergence theorem its nodal forces are those of the
+ * stress -p I in all points, -int p phi n dA = -sum V_p p grad phi, so no surface has to be found and a body under -p I is in
+ * equilibrium to round-off, however deformed. Walls then carry what differs from p. */
 typedef struct MpmTraction {
   int axis;            /* 0, 1, 2 */
   int side;            /* +1 or -1: which outermost layer */
   double traction[3];  /* Pa, in global axes */
+  int surface;         /* 1: `pressure` on the whole surface; the entries above are not used */
+  double pressure;     /* Pa, positive pushes into the body */
 } MpmTraction;
 
 /* Copies of foreign points: begin finds whom to send what (once per step, after positions are known), forward repeats

@@ -55,6 +55,10 @@ BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count) 
   if (count < 0) return base_error(BASE_ERROR_ARGUMENT, "tractions: count is %d; allowed: >= 0", count);
   for (int t = 0; t < count; t++) {
     const MpmTraction *traction = &tractions[t];
+    if (traction->surface) {
+      if (isfinite(traction->pressure)) continue;
+      return base_error(BASE_ERROR_ARGUMENT, "traction: pressure is %g; it must be finite", traction->pressure);
+    }
     if (traction->axis < 0 || traction->axis >= mpm->scene.dimension)
       return base_error(BASE_ERROR_ARGUMENT, "traction: axis is %d; allowed: 0 to %d", traction->axis,
                         mpm->scene.dimension - 1);

@@ -2,7 +2,7 @@
 /* Traction on the outermost layer of points (errata A.6): a point belongs to it if no other point lies beyond it, seen
  * along the axis within half a point's width to the sides. Its face has the area V / h, h being the point's own width.
  * The normal component of the traction acts along the face's current normal, as a pressure does (a force of fixed
- * direction would turn a body that is free to turn); the tangential components act along their axes. */
+ * direction would turn a body that is free to turn); the tangential components act along their axes. Or a pressure on the whole surface, see mpm.h. */
 #include <math.h>
 
 #include "../base/tensor.h"
@@ -80,6 +80,20 @@ static void add_one(Mpm *mpm, const MpmTraction *traction, const MpmPoint *point
   }
 }
 
+/* load holds -V sigma_ij / h: the stress of the points is measured from that of the pressure. */
+static void add_surface_pressure(const Mpm *mpm, double pressure, const MpmPoint *points, MpmVec *load) {
+  const int dimension = mpm->scene.dimension, width = mpm_load_width(mpm);
+  for (int s = 0; s < mpm->points.live; s++) {
+    const double volume = points[s].volume0 * tensor_determinant(points[s].deformation_gradient);
+    MpmVec *slope = load + (size_t)s * (size_t)width + 1;
+    for (int i = 0; i < dimension; i++) slope[i][1 + i] -= volume * mpm->inverse_spacing * pressure;
+  }
+}
+
 void mpm_traction_add(Mpm *mpm, const MpmPoint *points, MpmVec *load) {
-  for (int t = 0; t < mpm->traction_count; t++) add_one(mpm, &mpm->tractions[t], points, load);
+  for (int t = 0; t < mpm->traction_count; t++) {
+    const MpmTraction *traction = &mpm->tractions[t];
+    if (traction->surface) add_surface_pressure(mpm, traction->pressure, points, load);
+    else add_one(mpm, traction, points, load);
+  }
 }

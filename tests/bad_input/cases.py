@@ -276,6 +276,8 @@ CASES = [
     traction("traction_no_value", "axis y side +", "'pressure'", "missing", "traction"),
     traction("traction_two_values", "axis y side + pressure 1 traction 0 1 0", "'pressure'", "'traction'",
            "together"),
+    traction("traction_surface_and_axis", "axis y side + surface pressure 100", "'surface'", "'axis'", "together"),
+    traction("traction_surface_alone", "surface", "'pressure'", "missing"),
     traction("traction_nan", "axis y side + pressure nan", "'pressure'", "'nan'", "finite"),
     vtk("vtk_every_zero", "every 0 prefix see rves 1", "'every'", "'0'", "from 1"),
     vtk("vtk_no_prefix", "every 2 rves 1", "'prefix'", "missing"),
