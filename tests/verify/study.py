@@ -16,6 +16,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 from conftest import BUILD, ROOT, environment, parse_dump, parse_thermo  # noqa: E402
@@ -110,3 +111,22 @@ class Study:
         figure.savefig(path, dpi=100, bbox_inches="tight")
         plt.close(figure)
         self.figures.append(path.name)
+
+    def pack(self, name, **settings):
+        """A packing by dempm-pack, made once; its path."""
+        path = self.folder / f"{name}.packing"
+        words = [word for key, value in settings.items() for word in (key, *(value if isinstance(value, tuple) else (value,)))]
+        mark = path.with_suffix(".made")
+        if not (path.exists() and mark.exists() and mark.read_text() == str(words)):
+            subprocess.run([str(w) for w in (BUILD / "dempm-pack", "generate", path, *words)], check=True, stdout=subprocess.PIPE,
+                           env=environment(THREADS))
+            mark.write_text(str(words))
+        return path
+
+    def element(self, name, packing, path, **settings):
+        """An element test by dempm-rve; its columns as arrays. `__` in a name stands for `/`."""
+        out = self.folder / f"{name}.csv"
+        sets = [word for key, value in settings.items() for word in ("--set", f"{key.replace('__', '/')}={value}")]
+        subprocess.run([str(w) for w in (BUILD / "dempm-rve", "run", packing, "--path", path, "--dimension", 2, "--out", out, *sets)],
+                       check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment(THREADS))
+        return np.genfromtxt(out, delimiter=",", names=True)
