@@ -19,7 +19,7 @@ ROUNDS ?= 5#                       of make bench
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
 PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
-         check-cuda install clean help deps programs validate cost FORCE
+         check-cuda install clean help deps programs validate verify verify-full cost FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -174,6 +174,11 @@ demo: programs
 # Compares with LAMMPS and YADE too where they are installed.
 validate: programs $(TOOLS)
 	$(foreach s,rve_stability rve_quasi_static rve_against_peers,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
+# The cases of TM-DEMPM; -full: the papers' sizes, hours to days, goes on where it was interrupted.
+verify: programs
+	$(RUN_ENV) $(PYTHON) tests/verify/verify.py $(CASES)
+verify-full: programs
+	$(RUN_ENV) $(PYTHON) tests/verify/verify.py --full $(CASES)
 cost: programs
 	$(RUN_ENV) $(PYTHON) tests/validation/rve_cost_error.py $(if $(QUICK),--quick)
 
@@ -224,6 +229,7 @@ help:
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
 	@echo "make validate     the figures of doc/validation.md; also against LAMMPS and YADE where they are installed"
+	@echo "make verify       the cases of TM-DEMPM against their references, error beside seconds (verify-full: the papers' sizes; CASES=rod)"
 	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"

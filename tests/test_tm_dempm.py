@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """TM-DEMPM 5.1.1 and 5.2.1 from the scripts in examples/, against closed forms (corrected as in doc/theory.md)."""
-import pathlib
-
 import numpy as np
 import pytest
 from scipy.special import erfc
 
-from conftest import BUILD, ROOT, execute
+from conftest import ROOT
+from verify.exact import danilovskaya, rod_temperature
 
 EXAMPLES = ROOT / "examples"
 
@@ -18,18 +17,6 @@ def profile(run, name, points, length):
         x = np.array(columns["x"])[order]
         x0 = (np.arange(points) + 0.5) * length / points
         yield step, x0, x, np.array(columns["f_mpm[13]"])[order], np.array(columns["f_mpm[1]"])[order]
-
-
-def danilovskaya(x, t):
-    """Stress over E beta T1 and displacement over beta T1 of the heated bar with a free end; unit constants."""
-    grow = np.exp(np.minimum(t - x, 50))
-    minus = grow * erfc(x / (2 * np.sqrt(t)) - np.sqrt(t))
-    plus = np.exp(t + x) * erfc(x / (2 * np.sqrt(t)) + np.sqrt(t))
-    front = t > x
-    stress = -0.5 * (minus + plus) + np.where(front, grow, 0)
-    displacement = (0.5 * (minus - plus) - 2 * np.sqrt(t / np.pi) * np.exp(-x * x / (4 * t))
-                    + x * erfc(x / (2 * np.sqrt(t))) - np.where(front, grow - 1, 0))
-    return stress, displacement
 
 
 # Bounds for displacement, stress ahead of the front, rms of stress behind it; measured: FLIP 0.012, 0.7 %, 6.2 %; APIC 0.002,
@@ -59,12 +46,6 @@ def test_heated_bar_follows_the_closed_form(dempm, transfer):
             else:
                 behind.append(error)
     assert len(behind) == 38 and np.sqrt(np.mean(np.square(behind))) < rms_bound
-
-
-def rod_temperature(x, t, kappa=0.1, hot=100.0):
-    n = np.arange(1, 400)[:, None]
-    series = np.sum((-1.0) ** n / n * np.exp(-((n * np.pi) ** 2) * kappa * t) * np.sin(n * np.pi * x[None, :]), axis=0)
-    return hot * x + 2 * hot / np.pi * series
 
 
 @pytest.fixture(scope="module")

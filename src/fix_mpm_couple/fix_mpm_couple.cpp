@@ -68,7 +68,7 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
   KeywordParser parser(
       lmp, this, narg, arg, 3,
       {"grid", "origin", "shape", "transfer", "order", "material", "thermal", "temperature", "mechanics",
-       "damping/point", "damping/grid", "point/size", "density/bulk", "timestep/check", "leaving", "threads"});
+       "damping/point", "damping/grid", "point/size", "density/bulk", "timestep/check", "leaving", "threads", "follow"});
   while (parser.next()) {
     if (parser.is("grid")) scene_.spacing = parser.number(NumberRange::positive());
     else if (parser.is("origin"))
@@ -90,7 +90,10 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
     else if (parser.is("density/bulk")) given_density_ = parser.number(NumberRange::positive());
     else if (parser.is("timestep/check")) check_time_step_ = parser.yes_no();
     else if (parser.is("leaving")) delete_leaving_ = parser.choice({"error", "delete"}) == 1;
-    else if (parser.is("threads")) scene_.threads = parser.integer(1, 4096);
+    else if (parser.is("follow")) {
+      do followed_.push_back(parser.word("the id of a plane fix mpm/wall"));
+      while (parser.has_value());
+    } else if (parser.is("threads")) scene_.threads = parser.integer(1, 4096);
   }
   check_keywords(parser);
   if (!parser.given("point/size")) take_size_from_lattice();
@@ -334,7 +337,44 @@ void FixMPMCouple::find_walls_and_tractions() {
     if (traction && traction->mpm_id() == id) tractions.push_back(traction->traction());
   }
   fix_check(lmp, this, mpm_set_walls(mpm_, walls_.data(), (int)walls_.size()));
+  check_followed();
+  follow_walls();
   fix_check(lmp, this, mpm_set_tractions(mpm_, tractions.data(), (int)tractions.size()));
+}
+
+static FixMPMWall *find_wall(const std::vector<FixMPMWall *> &walls, const std::string &name) {
+  for (FixMPMWall *wall : walls)
+    if (name == wall->id) return wall;
+  return NULL;
+}
+
+void FixMPMCouple::check_followed() {
+  bool taken[3] = {false, false, false};
+  for (const std::string &name : followed_) {
+    const FixMPMWall *wall = find_wall(wall_fixes_, name);
+    int axis;
+    if (!wall || wall->stretch(scene_.origin, axis) == 0.0)
+      fix_failed(lmp, this, "keyword 'follow': '" + name + "' is given, allowed is the id of a plane fix mpm/wall of this fix, "
+                            "not at the grid's origin");
+    const double cells = (wall->first_position() - scene_.origin[axis]) / scene_.spacing;
+    if (fabs(cells - round(cells)) > 1e-6 || round(cells) == 0.0)
+      fix_failed(lmp, this, format_text("keyword 'follow': wall '%s' is %g cells from the grid's origin; allowed is a whole number "
+                                        "other than 0, so that it is on a node", name.c_str(), cells));
+    if (taken[axis]) fix_failed(lmp, this, "keyword 'follow': '" + name + "' is the second wall along its axis; allowed is one");
+    taken[axis] = true;
+  }
+}
+
+/* The grid is as long as its walls say. */
+void FixMPMCouple::follow_walls() {
+  if (followed_.empty()) return;
+  double stretch[3] = {1.0, 1.0, 1.0};
+  for (const std::string &name : followed_) {
+    int axis;
+    const double ratio = find_wall(wall_fixes_, name)->stretch(scene_.origin, axis);
+    stretch[axis] = ratio;
+  }
+  fix_check(lmp, this, mpm_set_stretch(mpm_, stretch));
 }
 
 /* Nothing here changes the way of points that have run before: a restart continues bit for bit. */

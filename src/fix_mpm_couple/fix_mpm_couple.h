@@ -129,6 +129,7 @@ class FixMPMCouple : public Fix {
   /* What the command says. */
   MpmScene scene_;
   std::string rve_id_; /* empty: elastic */
+  std::vector<std::string> followed_; /* ids of the walls that the grid follows */
   MpmElasticMode elastic_mode_ = MPM_ELASTIC_3D;
   double start_temperature_ = 0.0, given_density_ = 0.0 /* 0: the packings' */;
   double size0_[3] = {};
@@ -173,6 +174,8 @@ class FixMPMCouple : public Fix {
   void create_mpm();
   void destroy_mpm();
   void find_walls_and_tractions();
+  void check_followed();
+  void follow_walls();
   void check_time_step(bool starting);
 
   bool is_point(int i) const;

@@ -125,9 +125,10 @@ void FixMPMCouple::post_run() {
       "RVEs\n",
       id, (long long)law.rves, (long long)law.grains, steps, steps / seconds,
       100.0 * (law.seconds - rve_seconds_before_) / seconds);
-  if (law.shared > 0)
-    line += format_text("Fix %s: %lld of %lld RVE steps so far were copies of an RVE with the same packing and history\n", id,
-                        (long long)law.shared, (long long)law.calls);
+  line += format_text("Fix %s: %lld RVE steps so far: %lld computed, %lld copies of one with the same packing and history, "
+                      "%lld not run as their points rest\n",
+                      id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared), (long long)law.shared,
+                      (long long)law.rested);
   if (screen) fputs(line.c_str(), screen);
   if (logfile) fputs(line.c_str(), logfile);
 }

@@ -35,7 +35,8 @@ FixMPMRve::FixMPMRve(LAMMPS *lammps, int narg, char **arg)
       law_(NULL),
       assigned_(false),
       install_pending_(false),
-      rest_pending_(false) {
+      rest_pending_(false),
+      rest_error_(0.0) {
   restart_global = 1;
   scene_.dimension = domain->dimension;
   scene_.reference_temperature = NAN; /* asked for when heat flows */
@@ -50,7 +51,8 @@ FixMPMRve::~FixMPMRve() {
 void FixMPMRve::read_keywords(int narg, char **arg) {
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
-                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "precision", "share", "backend", "threads", "replay"});
+                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "precision", "share", "rest", "backend", "threads",
+                        "replay"});
   while (parser.next()) {
     if (parser.is("packing")) {
       do packing_files_.push_back(parser.word("the name of a file with a periodic packing"));
@@ -69,6 +71,7 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
     else if (parser.is("skin")) scene_.skin = parser.number(NumberRange::positive());
     else if (parser.is("rotation")) scene_.rotation = parser.yes_no();
     else if (parser.is("share")) scene_.share = parser.yes_no();
+    else if (parser.is("rest")) rest_error_ = parser.accept("no") ? 0.0 : parser.number(NumberRange::inside(0.0, 0.1));
     else if (parser.is("precision")) scene_.mixed = parser.choice({"double", "mixed"});
     else if (parser.is("backend"))
       backend_ =
@@ -203,6 +206,7 @@ void FixMPMRve::prepare(const char *user, int type, bool thermal) {
   if (scene.tangential_stiffness > 0.0) read_packings(scene.tangential_stiffness);
   settle_backend();
   fix_check(lmp, this, rve_law_create(world, &scene, packings_.data(), (int)packings_.size(), backend_, &law_));
+  rve_law_set_rest(law_, rest_error_);
   fix_check(lmp, this, rve_law_set_replay(law_, replay_directory_.empty() ? NULL : replay_directory_.c_str()));
   if (!restart_state_.empty()) {
     fix_check(lmp, this, rve_law_unpack(law_, restart_state_.data(), restart_state_.size()));

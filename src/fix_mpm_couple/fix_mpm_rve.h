@@ -65,6 +65,7 @@ class FixMPMRve : public Fix {
   std::string user_;                /* id of the fix mpm/couple that this law serves */
   std::vector<char> restart_state_; /* from a restart file, until the law exists */
   bool assigned_, install_pending_, rest_pending_;
+  double rest_error_; /* keyword rest */
 
   void read_keywords(int, char **);
   void check_keywords(const class KeywordParser &);

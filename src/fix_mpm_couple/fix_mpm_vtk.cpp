@@ -67,5 +67,5 @@ void FixMPMVtk::write_grid() {
   const MpmScene *scene = mpm_scene(mpm_->mpm());
   fix_check(lmp, this,
             vtk_write_grid(world, prefix_.c_str(), update->ntimestep, (double)update->ntimestep * update->dt, &view,
-                           scene->spacing, scene->origin));
+                           scene->origin));
 }

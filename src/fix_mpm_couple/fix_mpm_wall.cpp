@@ -127,6 +127,13 @@ MpmWall FixMPMWall::present() const {
   return wall;
 }
 
+double FixMPMWall::stretch(const double origin[3], int &axis) const {
+  axis = axis_;
+  if (wall_.kind != MPM_WALL_PLANE) return 0.0;
+  const double first = wall_.point[axis_] - origin[axis_];
+  return (first + displacement_[axis_]) / first;
+}
+
 void FixMPMWall::end_step(const MpmWall &answered, double dt) {
   double power = 0.0;
   for (int i = 0; i < 3; i++) {

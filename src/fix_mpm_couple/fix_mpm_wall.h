@@ -53,6 +53,10 @@ class FixMPMWall : public Fix {
   void begin_run(bool thermal, const double low[3], const double high[3]);
   /* The wall as it stands now. */
   MpmWall present() const;
+  /* By what a grid that ends at this plane has been stretched along the plane's axis since the wall was defined; 0: no plane. */
+  double stretch(const double origin[3], int &axis) const;
+  /* Where the plane was defined, along its axis. */
+  double first_position() const { return wall_.point[axis_]; }
   /* Takes the answers of a step over and moves on by dt. */
   void end_step(const MpmWall &answered, double dt);
 

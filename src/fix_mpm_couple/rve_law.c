@@ -67,6 +67,8 @@ void rve_law_destroy(RveLaw *law) {
   rve_store_destroy(law->store);
   base_free(law->point_value);
   base_free(law->request_input);
+  base_free(law->run_input);
+  base_free(law->run_handle);
   base_free(law->request_value);
   base_free(law->replay_directory);
   MPI_Comm_free(&law->comm);
@@ -130,6 +132,8 @@ static BaseStatus reserve(RveLaw *law, int points, int requests) {
   }
   if (requests > law->request_room) {
     TRY(BASE_GROW(0, (size_t)requests, &law->request_input));
+    TRY(BASE_GROW(0, (size_t)requests, &law->run_input));
+    TRY(BASE_GROW(0, (size_t)requests, &law->run_handle));
     TRY(BASE_GROW(0, (size_t)requests * RVE_FARM_WIDTH, &law->request_value));
     law->request_room = requests;
   }
@@ -181,17 +185,18 @@ static void pack_input(const MpmLawBatch *batch, double *value) {
 
 static void pack_answer(const RveStoreItem *item, double *value) {
   const RveAnswer *answer = &item->answer;
+  const int is_resting = item->rest.skipped > 0;
   double *scalars = value + OUT_SCALARS;
-  memcpy(value + OUT_STRESS, answer->stress, sizeof answer->stress);
+  memcpy(value + OUT_STRESS, is_resting ? item->rest.stress : answer->stress, sizeof answer->stress);
   memcpy(value + OUT_CONDUCTIVITY, answer->conductivity, sizeof answer->conductivity);
-  value[OUT_HEAT] = answer->heat;
+  value[OUT_HEAT] = is_resting ? 0.0 : answer->heat;
   value[OUT_MODULUS] = answer->modulus;
   scalars[MPM_LAW_SOLID_FRACTION] = answer->solid_fraction;
   scalars[MPM_LAW_COORDINATION] = answer->coordination;
   scalars[MPM_LAW_BOND_FRACTION] = answer->bond_fraction;
   scalars[MPM_LAW_UNBALANCED] = answer->unbalanced;
   scalars[MPM_LAW_ENERGY_DENSITY] = (answer->elastic_energy + answer->kinetic_energy) / answer->volume;
-  scalars[MPM_LAW_DISSIPATION] = item->dissipation;
+  scalars[MPM_LAW_DISSIPATION] = is_resting ? 0.0 : item->dissipation;
 }
 
 static void unpack_answers(const double *value, MpmLawBatch *batch) {
@@ -244,6 +249,34 @@ static BaseStatus report_failure(const RveLaw *law, int handle, int64_t tag) {
                     tag, failure.step, failure.call_step, failure.call_steps, failure.cause, note);
 }
 
+void rve_law_set_rest(RveLaw *law, double error) { law->rest_error = error; }
+
+/* run_handle, run_input: the RVEs that have to be run; returns their number. */
+static int leave_resting(RveLaw *law, int requests, const int *handles, double dt) {
+  const RveScene *scene = rve_store_scene(law->store);
+  int run = 0;
+  for (int q = 0; q < requests; q++) {
+    RveStoreItem *item = rve_store_item(law->store, handles[q]);
+    law->run_input[run] = law->request_input[q];
+    law->run_handle[run] = handles[q];
+    run += !rve_rest_skips(&item->rest, scene, &item->answer, law->rest_error, dt, &law->run_input[run]);
+  }
+  law->rested += requests - run;
+  return run;
+}
+
+/* An answer without a step (dt = 0) leaves RVEs that rest as they are. */
+static void judge_rest(RveLaw *law, int run, double dt) {
+  const RveScene *scene = rve_store_scene(law->store);
+  for (int q = 0; q < run; q++) {
+    RveStoreItem *item = rve_store_item(law->store, law->run_handle[q]);
+    const double temperature = law->run_input[q].temperature;
+    if (dt > 0.0 && law->rest_error > 0.0)
+      rve_rest_judge(&item->rest, scene, &item->answer, law->rest_error, temperature);
+    else if (dt > 0.0 || item->rest.skipped == 0) rve_rest_wake(&item->rest, scene, &item->answer, temperature);
+  }
+}
+
 /* This rank's RVEs; the error of the lowest tag on any rank is everybody's. */
 static BaseStatus step_requests(RveLaw *law, double dt) {
   const int64_t *asked;
@@ -251,25 +284,29 @@ static BaseStatus step_requests(RveLaw *law, double dt) {
   int unstable = -1;
   const int requests = rve_farm_requests(law->farm, &asked, &handles);
   int64_t key = bad_request(law, requests, asked);
+  int run = 0;
   BaseStatus status;
   if (key > 0)
     status = base_error(BASE_ERROR_UNSTABLE, "material point %" PRId64
                         ": its velocity gradient or temperature is not finite", key);
-  else
-    status = rve_store_step(law->store, requests, handles, law->request_input, dt, &unstable);
+  else {
+    run = leave_resting(law, requests, handles, dt);
+    status = rve_store_step(law->store, run, law->run_handle, law->run_input, dt, &unstable);
+  }
   if (unstable >= 0) {
     key = rve_store_item(law->store, unstable)->tag;
     status = report_failure(law, unstable, key);
   }
   TRY(rank_agree(law->comm, status, key));
 
+  judge_rest(law, run, dt);
   law->worst_unbalanced = 0.0;
   for (int q = 0; q < requests; q++) {
     const RveStoreItem *item = rve_store_item(law->store, handles[q]);
     law->worst_unbalanced = fmax(law->worst_unbalanced, item->answer.unbalanced);
     pack_answer(item, law->request_value + (size_t)q * OUTPUT_WIDTH);
   }
-  if (dt > 0.0) law->rves_run = requests;
+  if (dt > 0.0) law->rves_run = run;
   return BASE_OK;
 }
 

@@ -30,6 +30,7 @@ typedef struct RveLawTotals {
   int64_t rves_run;        /* in the last step */
   int64_t particle_steps;  /* grains times DEM steps, since the law was created (not before a restart) */
   int64_t calls, shared;   /* steps of RVEs since then, and how many were copies of a twin's (depends on the ranks) */
+  int64_t rested;          /* steps that were not run since their points are at rest, not among the calls */
   double worst_unbalanced; /* of the last step */
   double friction_work;    /* J, slip work since the RVEs were created (per metre of depth in 2D) */
   double damping_work;     /* J, lost to local and viscous damping, likewise */
@@ -61,6 +62,10 @@ void rve_law_as_mpm_law(RveLaw *law, MpmLaw *mpm_law);
 /* An RVE that becomes unstable is written to `directory`/rve_TAG.replay, for dempm-rve replay: of each rank the one with
  * the lowest tag. NULL (so at first): none. The directory is not created. Local; BASE_ERROR_MEMORY. */
 BaseStatus rve_law_set_replay(RveLaw *law, const char *directory);
+
+/* RVEs whose points rest are not run: their stress is estimated while its error stays below `error` times their mean pressure
+ * (rve_rest.h). 0 (so at first): all are run. Local. */
+void rve_law_set_rest(RveLaw *law, double error);
 
 BaseStatus rve_law_totals(RveLaw *law, RveLawTotals *totals);
 BaseStatus rve_law_set_scene(RveLaw *law, const RveScene *scene);

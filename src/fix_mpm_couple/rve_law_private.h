@@ -14,13 +14,17 @@ struct RveLaw {
   RveBackend backend;
   RveFarm *farm;
   RveStore *store;
-  int rves_run; /* on this rank, in the last step */
+  int rves_run;    /* on this rank, in the last step */
+  double rest_error; /* of rve_law_set_rest() */
+  int64_t rested;  /* calls of this rank's RVEs that were answered at rest, since creation */
   double worst_unbalanced;
   char *replay_directory; /* NULL: no replays */
   /* Room for the plan in force. */
   int point_room, request_room;
   double *point_value;     /* [point_room][RVE_FARM_WIDTH] */
   RveInput *request_input; /* [request_room] */
+  RveInput *run_input;     /* [request_room] of the requests that are run, as are */
+  int *run_handle;         /* [request_room] */
   double *request_value;   /* [request_room][RVE_FARM_WIDTH] */
 };
 

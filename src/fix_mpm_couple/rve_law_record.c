@@ -8,7 +8,7 @@
 #include "rank_agree.h"
 #include "rve_law_private.h"
 
-enum { RECORD_VERSION = 1, STATE_MESSAGE = 2 };
+enum { RECORD_VERSION = 2, STATE_MESSAGE = 2 };
 static const char record_magic[8] = "DEMPMRVE";
 static const size_t largest_message = (size_t)1 << 30; /* bytes; MPI counts in int */
 
@@ -29,6 +29,7 @@ typedef struct Entry {
   int64_t tag;
   uint64_t size; /* of its state, bytes; the state takes padded(size) */
   double scale, dissipation;
+  RveRest rest;
 } Entry;
 
 static size_t padded(size_t size) { return (size + 7) / 8 * 8; }
@@ -88,7 +89,7 @@ static BaseStatus pack_part(RveLaw *law, Part *part) {
     size_t written;
     TRY(rve_store_pack(law->store, handles[k], part->states + part->bytes, &written));
     part->entry[part->count++] =
-        (Entry){item->tag, written, item->scale, item->dissipation};
+        (Entry){item->tag, written, item->scale, item->dissipation, item->rest};
     part->bytes += padded(written);
   }
   return BASE_OK;
@@ -335,7 +336,9 @@ static BaseStatus restore_states(const char *bytes, const Header *header, RveFar
   for (uint64_t k = 0; k < header->rves; k++) {
     const Entry entry = entry_of(bytes, k);
     const int handle = rve_farm_handle(farm, entry.tag);
-    if (handle >= 0) rve_store_item(store, handle)->dissipation = entry.dissipation;
+    if (handle < 0) continue;
+    rve_store_item(store, handle)->dissipation = entry.dissipation;
+    rve_store_item(store, handle)->rest = entry.rest;
   }
   return BASE_OK;
 }

@@ -196,6 +196,7 @@ BaseStatus rve_store_add(RveStore *store, int n, const int64_t *tag, const int *
     slot->rve = k;
     slot->item = (RveStoreItem){.tag = tag[k], .packing = packing[k], .grains = store->packing[packing[k]].grains,
                                 .scale = NAN, .answer = store->answer[k]};
+    rve_rest_wake(&slot->item.rest, &store->scene, &slot->item.answer, store->scene.reference_temperature);
   }
   rve_batch_keep_states(batch, store->keep_states);
   store->batch[store->batches++] = batch;
@@ -311,6 +312,7 @@ BaseStatus rve_store_refresh(RveStore *store) {
   for (int s = 0; s < store->slots && status == BASE_OK; s++)
     if (store->slot[s].batch >= 0) handle[n++] = s;
   if (status == BASE_OK) status = rve_store_step(store, n, handle, input, 0.0, &unstable);
+  for (int k = 0; k < n && status == BASE_OK; k++) rve_store_item(store, handle[k])->rest.calm = 0;
   base_free(handle);
   base_free(input);
   return status;

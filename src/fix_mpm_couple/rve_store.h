@@ -5,6 +5,7 @@
 #define DEMPM_RVE_STORE_H
 
 #include "../cuda_rve/rve_replay.h"
+#include "rve_rest.h"
 
 typedef struct RveStore RveStore;
 
@@ -16,6 +17,7 @@ typedef struct RveStoreItem {
   double scale;       /* volume of the material point / of the RVE; NAN until told. Constant: both deform alike */
   double dissipation; /* of the last step, slip and damping, W/m3 of current volume */
   RveAnswer answer;   /* last one */
+  RveRest rest;       /* woken by the store when it makes or changes the RVE, else the law's */
 } RveStoreItem;
 
 /* Copies scene and packings. BASE_ERROR_ARGUMENT (scene or packing wrong), BASE_ERROR_MEMORY. */

@@ -241,14 +241,15 @@ void fill_cells(const Nodes &nodes, vtkUnstructuredGrid *grid) {
   }
 }
 
-void fill_grid(const Nodes &nodes, bool thermal, double spacing, const double origin[3], vtkUnstructuredGrid *grid) {
+void fill_grid(const Nodes &nodes, bool thermal, const double spacing[3], const double origin[3],
+               vtkUnstructuredGrid *grid) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   std::vector<double> mass, velocity, temperature;
   for (const auto &node : nodes) {
     const Row &row = node.second;
-    points->InsertNextPoint(origin[0] + spacing * row[ROW_I], origin[1] + spacing * row[ROW_J],
-                            origin[2] + spacing * row[ROW_K]);
+    points->InsertNextPoint(origin[0] + spacing[0] * row[ROW_I], origin[1] + spacing[1] * row[ROW_J],
+                            origin[2] + spacing[2] * row[ROW_K]);
     mass.push_back(row[ROW_MASS]);
     velocity.insert(velocity.end(), row.begin() + ROW_VX, row.begin() + ROW_VZ + 1);
     temperature.push_back(row[ROW_TEMPERATURE]);
@@ -300,7 +301,7 @@ extern "C" BaseStatus vtk_write_rve(const char *prefix, int64_t step, double tim
 }
 
 extern "C" BaseStatus vtk_write_grid(MPI_Comm comm, const char *prefix, int64_t step, double time,
-                                     const MpmGridView *view, double spacing, const double origin[3]) {
+                                     const MpmGridView *view, const double origin[3]) {
   const std::vector<double> rows = gather(comm, owned_rows(*view));
   int rank, thermal = view->nodes > 0 && view->temperature, any_thermal = 0;
   MPI_Comm_rank(comm, &rank);
@@ -309,7 +310,7 @@ extern "C" BaseStatus vtk_write_grid(MPI_Comm comm, const char *prefix, int64_t 
   if (rank == 0) {
     const std::string series = std::string(prefix) + "_grid", path = series + "_" + std::to_string(step) + ".vtu";
     vtkNew<vtkUnstructuredGrid> grid;
-    fill_grid(sort_nodes(rows), any_thermal != 0, spacing, origin, grid);
+    fill_grid(sort_nodes(rows), any_thermal != 0, view->spacing, origin, grid);
     vtkNew<vtkXMLUnstructuredGridWriter> writer;
     status = write_data(writer, grid, path);
     if (status == BASE_OK) status = vtk_series_add((series + ".pvd").c_str(), time, path.c_str());

@@ -26,9 +26,9 @@ BaseStatus vtk_write_rve(const char *prefix, int64_t step, double time, int64_t 
 
 /* Writes <prefix>_grid_<step>.vtu: the active nodes of all ranks with mass [kg], velocity [m/s], temperature (if there
  * is one) and the grid cells between them; renews <prefix>_grid.pvd. Collective over comm; the same file for every
- * number of ranks. spacing and origin [3] in m, as in MpmScene. */
+ * number of ranks. origin [3] in m, as in MpmScene. */
 BaseStatus vtk_write_grid(MPI_Comm comm, const char *prefix, int64_t step, double time, const MpmGridView *view,
-                          double spacing, const double origin[3]);
+                          const double origin[3]);
 
 /* Adds `file` (an existing file, in the directory of `series`) at `time` to the .pvd file `series`. */
 BaseStatus vtk_series_add(const char *series, double time, const char *file);

@@ -95,11 +95,16 @@ MpmWall mpm_wall_default(void);
 BaseStatus mpm_wall_check(const MpmWall *wall, int dimension, int thermal);
 
 /* Traction on the current outermost layer of points along +axis or -axis (errata A.6): each gets t V_p / h, h its own
- * width. The component along the axis acts along the current normal of the point's face, as a pressure does. */
+ * width. The component along the axis acts along the current normal of the point's face, as a pressure does.
+ * Or, with `surface`, a pressure on the whole surface of the body: by the divergence theorem its nodal forces are those of the
+ * stress -p I in all points, -int p phi n dA = -sum V_p p grad phi, so no surface has to be found and a body under -p I is in
+ * equilibrium to round-off, however deformed. Walls then carry what differs from p. */
 typedef struct MpmTraction {
   int axis;            /* 0, 1, 2 */
   int side;            /* +1 or -1: which outermost layer */
   double traction[3];  /* Pa, in global axes */
+  int surface;         /* 1: `pressure` on the whole surface; the entries above are not used */
+  double pressure;     /* Pa, positive pushes into the body */
 } MpmTraction;
 
 /* Copies of foreign points: begin finds whom to send what (once per step, after positions are known), forward repeats
@@ -124,6 +129,11 @@ typedef struct Mpm Mpm;
 BaseStatus mpm_create(const MpmScene *scene, const MpmLaw *law, const MpmHalo *halo, Mpm **mpm);
 void mpm_destroy(Mpm *mpm); /* accepts NULL */
 const MpmScene *mpm_scene(const Mpm *mpm);
+/* From the next step on a cell's edge along axis i is the scene's spacing times stretch[i] > 0, measured from the origin: a grid
+ * that follows a moving wall keeps it on a node. The grid is made anew in each step anyhow, so nothing else changes. 2D:
+ * stretch[2] is not read. BASE_ERROR_ARGUMENT, also for a periodic axis. */
+BaseStatus mpm_set_stretch(Mpm *mpm, const double stretch[3]);
+double mpm_smallest_spacing(const Mpm *mpm);
 BaseStatus mpm_set_walls(Mpm *mpm, MpmWall *walls, int count);            /* borrowed; outputs are written into them */
 BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count); /* copied */
 
@@ -156,6 +166,7 @@ void mpm_totals(const MpmPoint *points, int count, MpmTotals *totals);
 /* The active nodes of the last step, for writers. */
 typedef struct MpmGridView {
   int nodes;
+  double spacing[3];         /* m, edges of a cell */
   const int *index;          /* [nodes][3] */
   const double *mass;        /* [nodes] */
   const double *velocity;    /* [nodes][3] */

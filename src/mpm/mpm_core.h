@@ -124,7 +124,8 @@ struct Mpm {
   int wall_count;
   MpmTraction *tractions;
   int traction_count;
-  double inverse_spacing;
+  double spacing[3];  /* m, present edges of a cell: the scene's times what mpm_set_stretch() said */
+  MpmVec per_length;  /* lane 1 + i: 1 / spacing[i]; lane 0: 1 / the scene's spacing */
   int threads; /* OpenMP threads of a pass */
   double dt;
   MpmPoints points;

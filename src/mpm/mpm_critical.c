@@ -34,6 +34,7 @@ void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, 
   const MpmScene *scene = &mpm->scene;
   const int is_usl = scene->order == MPM_ORDER_USL, is_apic = scene->transfer == MPM_TRANSFER_APIC;
   const double factor = SAFETY * LIMIT[is_usl][is_apic][scene->shape];
+  const double smallest = mpm_smallest_spacing(mpm);
   *mechanical = *thermal = INFINITY;
   for (int p = 0; p < count; p++) {
     const MpmPoint *point = &points[p];
@@ -42,14 +43,14 @@ void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, 
       double square = 0.0;
       for (int i = 0; i < scene->dimension; i++) square += point->velocity[i] * point->velocity[i];
       const double speed = sqrt(fmax(point->modulus, 0.0) * volume / point->mass) + sqrt(square);
-      if (speed > 0.0) *mechanical = fmin(*mechanical, factor * scene->spacing / speed);
+      if (speed > 0.0) *mechanical = fmin(*mechanical, factor * smallest / speed);
     }
     if (scene->thermal) {
       const double conductivity = largest_eigenvalue(point->conductivity);
       const double capacity = point->mass * point->heat_capacity / volume;
       if (conductivity > 0.0)
         *thermal =
-            fmin(*thermal, capacity * scene->spacing * scene->spacing / (THERMAL_B[scene->shape] * conductivity));
+            fmin(*thermal, capacity * smallest * smallest / (THERMAL_B[scene->shape] * conductivity));
     }
   }
 }

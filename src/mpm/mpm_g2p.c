@@ -31,7 +31,7 @@ MPM_INLINE void gradient_body(Mpm *mpm, int first, int end, int of_temperature, 
       mpm_find_weights(mpm, k, &base, shape, &w);
       mpm_gather_gradient(grid->state, grid->cell_row[cell], &w, w.slope, dimension, mpm_shape_width(shape), gradient);
       for (int j = 0; j < dimension; j++) {
-        gradient[j] *= mpm->inverse_spacing;
+        gradient[j] *= mpm->per_length[1 + j];
         if (of_temperature) p->home[p->slot[k]].temperature_gradient[j] = gradient[j][0];
         else
           for (int i = 0; i < dimension; i++) p->velocity_gradient[3 * i + j][k] = gradient[j][1 + i];
@@ -110,7 +110,7 @@ MPM_INLINE void update_affine(const Mpm *mpm, int k, const int *row, const MpmWe
   mpm_gather_gradient(mpm->grid.rate, row, w, slope, dimension, width, change);
   for (int i = 0; i < dimension; i++)
     for (int j = 0; j < dimension; j++)
-      affine[3 * i + j] = mpm->inverse_spacing * (before[j][1 + i] + mpm->dt * change[j][1 + i]);
+      affine[3 * i + j] = mpm->per_length[1 + j] * (before[j][1 + i] + mpm->dt * change[j][1 + i]);
 }
 
 /* Eq. 28 and 29. */

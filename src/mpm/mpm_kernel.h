@@ -41,7 +41,7 @@ MPM_INLINE MpmCellBase mpm_cell_base(const Mpm *mpm, int cell, int dimension) {
 
 MPM_INLINE void mpm_find_weights(const Mpm *mpm, int k, const MpmCellBase *cell, MpmShape shape, MpmWeights *w) {
   const MpmPoints *p = &mpm->points;
-  w->f = (p->place[k] - cell->origin) * mpm->inverse_spacing - cell->base;
+  w->f = (p->place[k] - cell->origin) * mpm->per_length - cell->base;
   mpm_shape_axes(shape, w->f, shape == MPM_SHAPE_GIMP ? p->half[k] : mpm_vec_all(0.5), w->value, w->slope);
 }
 
@@ -108,11 +108,11 @@ MPM_INLINE void mpm_row_load(const Mpm *mpm, int k, int dimension, MpmVec *load)
   else
     ratio = f[0][k] * (f[4][k] * f[8][k] - f[5][k] * f[7][k]) - f[1][k] * (f[3][k] * f[8][k] - f[5][k] * f[6][k]) +
             f[2][k] * (f[3][k] * f[7][k] - f[4][k] * f[6][k]);
-  const double factor = -(p->volume0[k] * ratio * mpm->inverse_spacing);
+  const double volume = -(p->volume0[k] * ratio);
   load[0] = p->force[k];
-  load[1] = factor * (MpmVec){0.0, s[0][k], s[3][k], dimension == 3 ? s[4][k] : 0.0};
-  load[2] = factor * (MpmVec){0.0, s[3][k], s[1][k], dimension == 3 ? s[5][k] : 0.0};
-  if (dimension == 3) load[3] = factor * (MpmVec){0.0, s[4][k], s[5][k], s[2][k]};
+  load[1] = (volume * mpm->per_length[1]) * (MpmVec){0.0, s[0][k], s[3][k], dimension == 3 ? s[4][k] : 0.0};
+  load[2] = (volume * mpm->per_length[2]) * (MpmVec){0.0, s[3][k], s[1][k], dimension == 3 ? s[5][k] : 0.0};
+  if (dimension == 3) load[3] = (volume * mpm->per_length[3]) * (MpmVec){0.0, s[4][k], s[5][k], s[2][k]};
 }
 
 #endif

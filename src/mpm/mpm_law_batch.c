@@ -157,12 +157,12 @@ static void add_heat(const Mpm *mpm, int k, MpmVec *load) {
   static const int voigt[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
   const MpmPoint *point = &mpm->points.home[mpm->points.slot[k]];
   const int dimension = mpm->scene.dimension;
-  const double volume = mpm_row_volume(mpm, k), factor = volume * mpm->inverse_spacing;
+  const double volume = mpm_row_volume(mpm, k);
   load[0][0] = volume * point->heat + point->heat_external;
   for (int j = 0; j < dimension; j++) {
     double flux = 0.0;
     for (int l = 0; l < dimension; l++) flux -= point->conductivity[voigt[j][l]] * point->temperature_gradient[l];
-    load[1 + j][0] = factor * flux;
+    load[1 + j][0] = volume * mpm->per_length[1 + j] * flux;
   }
 }
 

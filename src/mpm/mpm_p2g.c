@@ -14,10 +14,10 @@ typedef struct Extras {
 } Extras;
 
 MPM_INLINE void add_affine(const Mpm *mpm, int k, const MpmWeights *w, int dimension, int width, MpmVec *sum) {
-  const double *affine = mpm->points.affine[k], factor = mpm->points.position[k][0] * mpm->scene.spacing;
+  const double *affine = mpm->points.affine[k], mass = mpm->points.position[k][0];
   MpmVec column[3];
   for (int j = 0; j < dimension; j++)
-    column[j] = factor * (MpmVec){0.0, affine[j], affine[3 + j], dimension == 3 ? affine[6 + j] : 0.0};
+    column[j] = (mass * mpm->spacing[j]) * (MpmVec){0.0, affine[j], affine[3 + j], dimension == 3 ? affine[6 + j] : 0.0};
   const int rows = dimension == 3 ? width * width : width;
 #pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {

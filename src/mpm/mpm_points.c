@@ -112,7 +112,7 @@ static const char *find_argument_fault(const Mpm *mpm, const MpmPoint *point) {
     return "heat_capacity must be finite and > 0";
   for (int i = 0; i < mpm->scene.dimension; i++)
     if (mpm->scene.shape == MPM_SHAPE_GIMP &&
-        !(point->size0[i] > 0.0 && point->size0[i] * mpm->inverse_spacing <= 1.0 + 1e-9))
+        !(point->size0[i] > 0.0 && point->size0[i] * mpm->per_length[1 + i] <= 1.0 + 1e-9))
       return "size0 must be > 0 and at most the grid's spacing (uGIMP)";
   return NULL;
 }
@@ -141,14 +141,14 @@ const char *mpm_find_fault(const Mpm *mpm, const MpmPoint *point, BaseStatus *st
 MpmVec mpm_half_edges(const Mpm *mpm, const double size0[3], const double f[9]) {
   MpmVec result = mpm_vec_all(0.5);
   for (int i = 0; i < mpm->scene.dimension; i++) {
-    double half = 0.5 * size0[i] * mpm->inverse_spacing;
+    double half = 0.5 * size0[i] * mpm->per_length[1 + i];
     if (mpm->scene.gimp_stretch) {
       double square = 0.0;
       for (int j = 0; j < mpm->scene.dimension; j++) {
         const double edge = f[3 * i + j] * size0[j];
         square += edge * edge;
       }
-      half = fmax(0.5 * sqrt(square) * mpm->inverse_spacing, 1e-6);
+      half = fmax(0.5 * sqrt(square) * mpm->per_length[1 + i], 1e-6);
     }
     result[1 + i] = half < 0.5 ? half : 0.5;
   }

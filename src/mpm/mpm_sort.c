@@ -52,7 +52,7 @@ void mpm_sort_items(MpmItem **item, MpmItem **spare, int n) {
 
 /* What is floored to find the cell, over h. */
 MPM_INLINE MpmVec find_anchor(const Mpm *mpm, MpmVec origin, MpmVec position, MpmVec half) {
-  const MpmVec u = (position - origin) * mpm->inverse_spacing;
+  const MpmVec u = (position - origin) * mpm->per_length;
   return mpm->scene.shape == MPM_SHAPE_LINEAR ? u : mpm->scene.shape == MPM_SHAPE_BSPLINE ? u - 0.5 : u - half;
 }
 

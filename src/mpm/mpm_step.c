@@ -12,6 +12,30 @@
 
 #include "mpm_core.h"
 
+static void set_spacing(Mpm *mpm, const double stretch[3]) {
+  const double h = mpm->scene.spacing;
+  mpm->per_length = mpm_vec_all(1.0 / h);
+  for (int i = 0; i < 3; i++) {
+    mpm->spacing[i] = i < mpm->scene.dimension ? h * stretch[i] : h;
+    mpm->per_length[1 + i] = 1.0 / mpm->spacing[i];
+  }
+}
+
+double mpm_smallest_spacing(const Mpm *mpm) {
+  return fmin(mpm->spacing[0], fmin(mpm->spacing[1], mpm->spacing[2]));
+}
+
+BaseStatus mpm_set_stretch(Mpm *mpm, const double stretch[3]) {
+  for (int i = 0; i < mpm->scene.dimension; i++) {
+    if (!(stretch[i] > 0.0 && isfinite(stretch[i])))
+      return base_error(BASE_ERROR_ARGUMENT, "stretch of the grid along axis %d is %g; allowed: finite and > 0", i, stretch[i]);
+    if (mpm->scene.periodic[i] && stretch[i] != 1.0)
+      return base_error(BASE_ERROR_ARGUMENT, "the grid cannot be stretched along axis %d, which is periodic", i);
+  }
+  set_spacing(mpm, stretch);
+  return BASE_OK;
+}
+
 BaseStatus mpm_create(const MpmScene *scene, const MpmLaw *law, const MpmHalo *halo, Mpm **result) {
   *result = NULL;
   TRY(mpm_scene_check(scene));
@@ -23,7 +47,8 @@ BaseStatus mpm_create(const MpmScene *scene, const MpmLaw *law, const MpmHalo *h
   mpm->scene = *scene;
   mpm->law = law;
   mpm->halo = halo;
-  mpm->inverse_spacing = 1.0 / scene->spacing;
+  const double unstretched[3] = {1.0, 1.0, 1.0};
+  set_spacing(mpm, unstretched);
   mpm->threads = scene->threads > 0 ? scene->threads : omp_get_max_threads();
   *result = mpm;
   return BASE_OK;
@@ -55,6 +80,10 @@ BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count) 
   if (count < 0) return base_error(BASE_ERROR_ARGUMENT, "tractions: count is %d; allowed: >= 0", count);
   for (int t = 0; t < count; t++) {
     const MpmTraction *traction = &tractions[t];
+    if (traction->surface) {
+      if (isfinite(traction->pressure)) continue;
+      return base_error(BASE_ERROR_ARGUMENT, "traction: pressure is %g; it must be finite", traction->pressure);
+    }
     if (traction->axis < 0 || traction->axis >= mpm->scene.dimension)
       return base_error(BASE_ERROR_ARGUMENT, "traction: axis is %d; allowed: 0 to %d", traction->axis,
                         mpm->scene.dimension - 1);
@@ -117,16 +146,17 @@ static void forget_errors(Mpm *mpm) {
 /* --------------------------------------------------------------------------------------------- parts of a step */
 
 /* Points within this distance may share a node with an own point, whatever their place in their cells. */
-static double halo_reach(const MpmScene *scene) {
+static double halo_reach(const Mpm *mpm) {
+  const MpmScene *scene = &mpm->scene;
   const double cells = scene->shape == MPM_SHAPE_LINEAR ? 2.0 : scene->shape == MPM_SHAPE_GIMP ? 3.5 : 3.0;
-  return scene->spacing * (cells + 1e-6);
+  return fmax(mpm->spacing[0], fmax(mpm->spacing[1], mpm->spacing[2])) * (cells + 1e-6);
 }
 
 /* Copies of foreign points. Collective. */
 static BaseStatus gather_foreign(Mpm *mpm, const MpmPoint **foreign) {
   MpmPoints *p = &mpm->points;
   mpm_points_write(mpm, MPM_WRITE_MOTION | (mpm->scene.gimp_stretch ? MPM_WRITE_SHAPE : 0));
-  TRY(mpm->halo->begin(mpm->halo->content, p->home, p->own, halo_reach(&mpm->scene), foreign, &p->foreign));
+  TRY(mpm->halo->begin(mpm->halo->content, p->home, p->own, halo_reach(mpm), foreign, &p->foreign));
   if (p->foreign > INT32_MAX - p->own) return base_error(BASE_ERROR_MEMORY, "more than %d points on a rank", INT32_MAX);
   return mpm_points_reserve(mpm, p->own + p->foreign);
 }
@@ -346,6 +376,7 @@ void mpm_grid_view(Mpm *mpm, MpmGridView *view) {
     if (mpm->scene.thermal) grid->view_temperature[n] = state[0];
   }
   *view = (MpmGridView){.nodes = grid->nodes,
+                        .spacing = {mpm->spacing[0], mpm->spacing[1], mpm->spacing[2]},
                         .index = (const int *)grid->index,
                         .mass = grid->view_mass,
                         .velocity = grid->view_velocity,

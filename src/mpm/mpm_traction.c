@@ -2,7 +2,8 @@
 /* Traction on the outermost layer of points (errata A.6): a point belongs to it if no other point lies beyond it, seen
  * along the axis within half a point's width to the sides. Its face has the area V / h, h being the point's own width.
  * The normal component of the traction acts along the face's current normal, as a pressure does (a force of fixed
- * direction would turn a body that is free to turn); the tangential components act along their axes. */
+ * direction would turn a body that is free to turn); the tangential components act along their axes. Or a
+ * pressure on the whole surface, see mpm.h. */
 #include <math.h>
 
 #include "mpm_kernel.h"
@@ -20,7 +21,7 @@ static int find_cell(const MpmGrid *grid, uint64_t key) {
 /* 1 if `other` hides the point at `place`: beyond it, within `half_width` (over h) to the sides. */
 static int hides(const Mpm *mpm, MpmVec other, MpmVec place, const MpmTraction *traction, const double half_width[3]) {
   for (int i = 0; i < mpm->scene.dimension; i++) {
-    const double offset = (other[1 + i] - place[1 + i]) * mpm->inverse_spacing;
+    const double offset = (other[1 + i] - place[1 + i]) * mpm->per_length[1 + i];
     if (i == traction->axis) {
       const double beyond = traction->side * offset;
       if (!(beyond > half_width[i] && beyond < 1.5)) return 0;
@@ -69,7 +70,7 @@ static void add_one(Mpm *mpm, const MpmTraction *traction, MpmVec *load) {
       const int is_axis = i == traction->axis;
       const double normal[3] = {i == 0, i == 1, i == 2};
       const double face = mpm_face_area(&p->home[p->slot[k]], f, normal, is_axis ? vector : unused);
-      half_width[i] = 0.5 * volume / face * mpm->inverse_spacing;
+      half_width[i] = 0.5 * volume / face * mpm->per_length[1 + i];
       if (is_axis) area = face;
     }
     if (!is_outermost(mpm, p->key[k], p->position[k], traction, half_width)) continue;
@@ -81,6 +82,20 @@ static void add_one(Mpm *mpm, const MpmTraction *traction, MpmVec *load) {
   }
 }
 
+/* load holds -V sigma_ij / h_j: the stress of the points is measured from that of the pressure. */
+static void add_surface_pressure(const Mpm *mpm, double pressure, MpmVec *load) {
+  const int dimension = mpm->scene.dimension, width = mpm_load_width(mpm);
+  for (int k = 0; k < mpm->points.live; k++) {
+    MpmVec *slope = load + (size_t)k * (size_t)width + 1;
+    const double volume = mpm_row_volume(mpm, k);
+    for (int i = 0; i < dimension; i++) slope[i][1 + i] -= volume * mpm->per_length[1 + i] * pressure;
+  }
+}
+
 void mpm_traction_add(Mpm *mpm, MpmVec *load) {
-  for (int t = 0; t < mpm->traction_count; t++) add_one(mpm, &mpm->tractions[t], load);
+  for (int t = 0; t < mpm->traction_count; t++) {
+    const MpmTraction *traction = &mpm->tractions[t];
+    if (traction->surface) add_surface_pressure(mpm, traction->pressure, load);
+    else add_one(mpm, traction, load);
+  }
 }

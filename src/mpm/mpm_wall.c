@@ -69,7 +69,7 @@ static int is_under(const Mpm *mpm, const MpmWall *wall, int node, double normal
   const double tolerance = ROUND_OFF * scene->spacing;
   double x[3] = {0.0, 0.0, 0.0}, velocity[3];
   for (int i = 0; i < scene->dimension; i++) {
-    x[i] = scene->origin[i] + scene->spacing * mpm->grid.index[node][i];
+    x[i] = scene->origin[i] + mpm->spacing[i] * mpm->grid.index[node][i];
     if (!(x[i] >= wall->range[0][i] - tolerance && x[i] <= wall->range[1][i] + tolerance)) return 0;
   }
   if (wall->kind == MPM_WALL_PLANE) return mpm_wall_distance(wall, scene->dimension, x, normal) <= tolerance;

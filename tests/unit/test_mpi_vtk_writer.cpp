@@ -129,9 +129,9 @@ static void grid_is_the_same_for_every_number_of_ranks(void **) {
     temperature[n] = 20.0 * n;
     for (int k = 0; k < 3; k++) node_velocity[3 * n + k] = n + 0.1 * k;
   }
-  const MpmGridView view = {9, index, mass, node_velocity, temperature, owned};
+  const MpmGridView view = {9, {0.5, 0.5, 0.5}, index, mass, node_velocity, temperature, owned};
   const double origin[3] = {10, 20, 0};
-  assert_int_equal(vtk_write_grid(MPI_COMM_WORLD, "field", 5, 1.5, &view, 0.5, origin), BASE_OK);
+  assert_int_equal(vtk_write_grid(MPI_COMM_WORLD, "field", 5, 1.5, &view, origin), BASE_OK);
   if (rank != 0) return;
   vtkNew<vtkXMLUnstructuredGridReader> reader;
   reader->SetFileName("field_grid_5.vtu");
@@ -153,9 +153,9 @@ static void a_directory_that_does_not_exist_is_named_on_all_ranks(void **) {
     assert_int_equal(vtk_write_rve("no_such_directory/rve", 1, 0.0, 1, &view), BASE_ERROR_FILE);
     assert_non_null(strstr(base_error_message(), "no_such_directory/rve_1_1.vtm"));
   }
-  const MpmGridView grid = {0, nullptr, nullptr, nullptr, nullptr, nullptr};
+  const MpmGridView grid = {};
   const double origin[3] = {0, 0, 0};
-  assert_int_equal(vtk_write_grid(MPI_COMM_WORLD, "no_such_directory/g", 1, 0.0, &grid, 1.0, origin), BASE_ERROR_FILE);
+  assert_int_equal(vtk_write_grid(MPI_COMM_WORLD, "no_such_directory/g", 1, 0.0, &grid, origin), BASE_ERROR_FILE);
   assert_non_null(strstr(base_error_message(), "no_such_directory/g_grid_1.vtu"));
 }
 

@@ -117,8 +117,112 @@ static void a_body_across_a_periodic_boundary_is_whole(void **state) {
   }
 }
 
+/* Cells that are no squares: APIC carries an affine field over them exactly, and a body under -p I rests. */
+static void stretched_cells_keep_affine_fields_and_balance(void **state) {
+  (void)state;
+  const double stretch[3] = {1.0, 0.7, 1.3}, A[9] = {0.3, -0.2, 0.1, 0.5, -0.4, 0.2, -0.1, 0.6, 0.25}, low[3] = {0.013, 0.02, 0.03};
+  const int number[3] = {8, 8, 8};
+  MpmLaw law = elastic_law(MPM_ELASTIC_3D, 1.0, 0.0);
+  for (int dimension = 2; dimension <= 3; dimension++)
+    for (int shape = 0; shape < 3; shape++) {
+      MpmScene scene = mpm_scene_default();
+      scene.dimension = dimension, scene.spacing = 0.1, scene.shape = (MpmShape)shape, scene.transfer = MPM_TRANSFER_APIC;
+      Mpm *mpm;
+      int count;
+      MpmPoint *points = make_box(dimension, low, number, 0.05, 1.0, 1, &count);
+      const MpmTraction around = {.surface = 1, .pressure = 2.0};
+      OK(mpm_create(&scene, &law, NULL, &mpm));
+      OK(mpm_set_stretch(mpm, stretch));
+      OK(mpm_set_tractions(mpm, &around, 1));
+      for (int p = 0; p < count; p++) {
+        for (int i = 0; i < dimension; i++) {
+          points[p].stress[i] = -2.0;
+          for (int j = 0; j < dimension; j++) {
+            points[p].affine[3 * i + j] = A[3 * i + j];
+            points[p].velocity[i] += A[3 * i + j] * points[p].position[j];
+          }
+        }
+      }
+      OK(mpm_step(mpm, points, count, 1e-9)); /* so short that the law adds nothing */
+      double gradient = 0.0, velocity = 0.0;
+      for (int p = 0; p < count; p++)
+        for (int i = 0; i < dimension; i++) {
+          double expected = 0.0;
+          for (int j = 0; j < dimension; j++) {
+            gradient = fmax(gradient, fabs(points[p].velocity_gradient[3 * i + j] - A[3 * i + j]));
+            expected += A[3 * i + j] * points[p].position[j];
+          }
+          velocity = fmax(velocity, fabs(points[p].velocity[i] - expected));
+        }
+      AT_MOST(gradient, 1e-12);
+      AT_MOST(velocity, 2e-9); /* of the time step */
+      free(points);
+      mpm_destroy(mpm);
+    }
+  law.destroy(law.content);
+}
+
+/* A plate presses a body by a tenth. On a grid that follows the plate the strain is the same everywhere; on one that does not,
+ * the plate acts from the next node on. */
+static double spread_of_strain(int follows) {
+  const double low[3] = {0.0, 0.0, 0.0}, height = 0.4, speed = 0.02;
+  const int number[3] = {4, 8, 1};
+  MpmLaw law = elastic_law(MPM_ELASTIC_PLANE_STRAIN, 1e4, 0.2);
+  MpmScene scene = mpm_scene_default();
+  scene.dimension = 2, scene.spacing = 0.1, scene.point_damping = 20.0;
+  Mpm *mpm;
+  int count;
+  MpmPoint *points = make_box(2, low, number, 0.05, 1000.0, 1, &count);
+  MpmWall wall[4] = {plane_wall(0, 0.0, 1.0, MPM_WALL_SLIP), plane_wall(0, 0.2, -1.0, MPM_WALL_SLIP),
+                     plane_wall(1, 0.0, 1.0, MPM_WALL_SLIP), plane_wall(1, height, -1.0, MPM_WALL_SLIP)};
+  wall[3].velocity[1] = -speed;
+  OK(mpm_create(&scene, &law, NULL, &mpm));
+  OK(mpm_set_walls(mpm, wall, 4));
+  OK(mpm_initialise(mpm, points, count));
+  double dt, thermal, largest = 0.0;
+  mpm_critical_time_steps(mpm, points, count, &dt, &thermal);
+  dt *= 0.8; /* cells get shorter */
+  const int steps = (int)(0.1 * height / speed / dt);
+  for (int s = 0; s < steps; s++) {
+    const double stretch[3] = {1.0, wall[3].point[1] / height, 1.0};
+    if (follows) OK(mpm_set_stretch(mpm, stretch));
+    OK(mpm_step(mpm, points, count, dt));
+    wall[3].point[1] -= speed * dt;
+  }
+  for (int p = 0; p < count; p++)
+    largest = fmax(largest, fabs(points[p].deformation_gradient[4] - wall[3].point[1] / height));
+  free(points);
+  mpm_destroy(mpm);
+  law.destroy(law.content);
+  return largest;
+}
+
+static void a_grid_that_follows_a_plate_strains_the_body_evenly(void **state) {
+  (void)state;
+  const double follows = spread_of_strain(1), stays = spread_of_strain(0);
+  printf("strain of 0.1: off by %.1e at most on a grid that follows the plate, %.1e on one that stays\n", follows, stays);
+  AT_MOST(follows, 0.006); /* measured 5.3e-3: uGIMP's domains keep their undeformed size */
+  assert_true(stays > 5 * follows);
+}
+
+static void wrong_stretches_are_refused(void **state) {
+  (void)state;
+  MpmLaw law = elastic_law(MPM_ELASTIC_3D, 1.0, 0.0);
+  MpmScene scene = mpm_scene_default();
+  scene.dimension = 2, scene.spacing = 0.1;
+  Mpm *mpm;
+  OK(mpm_create(&scene, &law, NULL, &mpm));
+  const double wrong[4][3] = {{0.0, 1.0, 1.0}, {1.0, -1.0, 1.0}, {NAN, 1.0, 1.0}, {1.0, INFINITY, 1.0}};
+  for (int k = 0; k < 4; k++) assert_int_equal(mpm_set_stretch(mpm, wrong[k]), BASE_ERROR_ARGUMENT);
+  mpm_destroy(mpm);
+  law.destroy(law.content);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(stretched_cells_keep_affine_fields_and_balance),
+      cmocka_unit_test(a_grid_that_follows_a_plate_strains_the_body_evenly),
+      cmocka_unit_test(wrong_stretches_are_refused),
       cmocka_unit_test(nodes_follow_the_points_and_not_the_box),
       cmocka_unit_test(a_body_across_a_periodic_boundary_is_whole),
   };

@@ -87,11 +87,11 @@ static void wrong_walls_and_tractions_are_refused(void **state) {
   expect(mpm_set_walls(mpm, walls, 2), BASE_ERROR_ARGUMENT, "velocity", "inf");
   walls[1] = good, walls[1].contact = (MpmWallContact)9;
   expect(mpm_set_walls(mpm, walls, 2), BASE_ERROR_ARGUMENT, "contact", "9");
-  MpmTraction traction = {2, 1, {0, 0, 0}};
+  MpmTraction traction = {.axis = 2, .side = 1};
   expect(mpm_set_tractions(mpm, &traction, 1), BASE_ERROR_ARGUMENT, "axis", "0 to 1");
-  traction = (MpmTraction){0, 0, {0, 0, 0}};
+  traction = (MpmTraction){.axis = 0, .side = 0};
   expect(mpm_set_tractions(mpm, &traction, 1), BASE_ERROR_ARGUMENT, "side", "-1 and 1");
-  traction = (MpmTraction){0, 1, {NAN, 0, 0}};
+  traction = (MpmTraction){.axis = 0, .side = 1, .traction = {NAN, 0, 0}};
   expect(mpm_set_tractions(mpm, &traction, 1), BASE_ERROR_ARGUMENT, "component 0", "nan");
   mpm_destroy(mpm);
   law.destroy(law.content);

@@ -241,7 +241,8 @@ static void tractions_load_the_outermost_layer(void **state) {
   Block block;
   make_block(&block, MPM_TRANSFER_FLIP, 1e6, 100.0, low);
   MpmTraction sides[4] = {
-      {0, 1, {-pressure, 0, 0}}, {0, -1, {pressure, 0, 0}}, {1, 1, {0, -pressure, 0}}, {1, -1, {0, pressure, 0}}};
+      {.axis = 0, .side = 1, .traction = {-pressure, 0, 0}}, {.axis = 0, .side = -1, .traction = {pressure, 0, 0}},
+      {.axis = 1, .side = 1, .traction = {0, -pressure, 0}}, {.axis = 1, .side = -1, .traction = {0, pressure, 0}}};
   /* One side alone, one step: momentum = p x height x dt. */
   OK(mpm_set_tractions(block.mpm, sides, 1));
   OK(mpm_step(block.mpm, block.points, block.count, block.dt));
@@ -265,6 +266,48 @@ static void tractions_load_the_outermost_layer(void **state) {
   free_block(&block);
 }
 
+/* The whole surface: a body under -p I rests to round-off, turned and sheared; a free one comes to -p I in every point. */
+static void a_surface_pressure_is_the_stress_at_rest(void **state) {
+  (void)state;
+  const double low[3] = {0.013, 0.027, 0.0}, pressure = 1e4;
+  const MpmTraction around = {.surface = 1, .pressure = pressure};
+  Block block;
+  make_block(&block, MPM_TRANSFER_FLIP, 1e6, 100.0, low);
+  OK(mpm_set_tractions(block.mpm, &around, 1));
+  for (int p = 0; p < block.count; p++) {
+    MpmPoint *point = &block.points[p];
+    const double x = point->position[0], y = point->position[1];
+    point->position[0] = 0.8 * x - 0.7 * y, point->position[1] = 0.5 * x + 0.9 * y;
+    for (int i = 0; i < 2; i++) point->stress[i] = -pressure;
+  }
+  OK(mpm_step(block.mpm, block.points, block.count, block.dt));
+  double fastest = 0.0;
+  for (int p = 0; p < block.count; p++)
+    for (int i = 0; i < 2; i++) fastest = fmax(fastest, fabs(block.points[p].velocity[i]));
+  AT_MOST(fastest / (pressure * 0.05 * block.dt / block.points[0].mass), 1e-14); /* against one point's load */
+  free_block(&block);
+
+  make_block(&block, MPM_TRANSFER_FLIP, 1e6, 100.0, low);
+  OK(mpm_set_tractions(block.mpm, &around, 1));
+  for (int s = 0; s < 6000; s++) OK(mpm_step(block.mpm, block.points, block.count, block.dt));
+  /* Single points keep what the grid does not see, an alternating stress; their mean is exact at rest. */
+  double error = 0.0, sum[2] = {0.0, 0.0}, volume = 0.0;
+  for (int p = 0; p < block.count; p++) {
+    const MpmPoint *point = &block.points[p];
+    const double *F = point->deformation_gradient, v = point->volume0 * (F[0] * F[4] - F[1] * F[3]);
+    volume += v;
+    for (int i = 0; i < 2; i++) {
+      sum[i] += v * point->stress[i];
+      error = fmax(error, fabs(point->stress[i] / -pressure - 1.0));
+    }
+  }
+  printf("pressure of 10000 on the whole surface: mean stress off by %.1e, single points by up to %.1e\n",
+         fabs(sum[0] / volume / -pressure - 1.0), error);
+  for (int i = 0; i < 2; i++) AT_MOST(fabs(sum[i] / volume / -pressure - 1.0), 1e-5);
+  AT_MOST(error, 0.01);
+  free_block(&block);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_sliding_block_decelerates_by_mu_g),
@@ -275,6 +318,7 @@ int main(void) {
       cmocka_unit_test(a_box_stops_a_block_at_its_face),
       cmocka_unit_test(a_range_limits_a_wall),
       cmocka_unit_test(tractions_load_the_outermost_layer),
+      cmocka_unit_test(a_surface_pressure_is_the_stress_at_rest),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

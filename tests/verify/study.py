@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What the cases of `make verify` share: runs of build/dempm, the report, figures.
+
+A case is a module case_NAME with verify(study), which runs scripts from examples/ by study.run(...) and states errors by
+study.check(...)."""
+import dataclasses
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from conftest import BUILD, ROOT, environment, parse_dump, parse_thermo  # noqa: E402
+
+EXAMPLES = ROOT / "examples"
+THREADS = len(os.sched_getaffinity(0))
+
+
+@dataclasses.dataclass
+class Run:
+    """One finished run: its folder, wall seconds, and what it cost."""
+    path: pathlib.Path
+    seconds: float
+    points: int
+    grains: int      # per point; 0 = continuum law
+    dem_steps: int   # per packing, mean over the packings
+    thermo: list
+
+    @property
+    def table(self):
+        return self.thermo[-1]
+
+    def dump(self, name):
+        return parse_dump((self.path / name).read_text())
+
+
+class Study:
+    """Collects rows {"case", "quantity", "error", "bound", "pass", "seconds", "points", "grains", "dem_steps"}."""
+
+    def __init__(self, case, folder, full):
+        self.case, self.full, self.folder = case, full, folder / case
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.rows, self.notes, self.figures = [], [], []
+
+    def run(self, name, script, variables=None, folders=(), files=(), grains=0, timeout=None, ranks=1):
+        """Runs a script of examples/ in a folder of its own, with the files of `folders` (of examples/) beside it. A run
+        that has ended with the same variables and the same program is not repeated: its results are read again."""
+        path = self.folder / name
+        variables = {key: str(value) for key, value in (variables or {}).items()}
+        program = BUILD / "dempm"
+        mark = path / "finished.json"
+        wanted = {"script": str(script), "variables": variables, "program": program.stat().st_mtime}
+        if mark.exists() and json.loads(mark.read_text())["wanted"] == wanted:
+            return self.read(path, json.loads(mark.read_text()), grains)
+        keep = self.full and path.exists()  # an interrupted run of full size: its restart files are there
+        if not keep:
+            shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True, exist_ok=True)
+        for file in [f for folder in folders for f in (EXAMPLES / folder).iterdir() if f.is_file()] + list(files):
+            shutil.copy(file, path)
+        (path / "out").mkdir(exist_ok=True)
+        command = [program, "-in", script] + [w for key, value in variables.items() for w in ("-var", key, *value.split(" "))]
+        if ranks > 1:
+            command = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks), *command]
+        start = time.monotonic()
+        with open(path / "screen", "w") as screen:
+            code = subprocess.run([str(word) for word in command], cwd=path, env=environment(THREADS // ranks or 1),
+                                  stdin=subprocess.DEVNULL, stdout=screen, stderr=subprocess.STDOUT, timeout=timeout).returncode
+        if code != 0:
+            tail = "\n".join((path / "screen").read_text(errors="replace").splitlines()[-8:])
+            raise RuntimeError(f"{self.case}: {name} ended with {code}\n{tail}")
+        done = {"wanted": wanted, "seconds": round(time.monotonic() - start, 2)}
+        mark.write_text(json.dumps(done))
+        return self.read(path, done, grains)
+
+    def read(self, path, done, grains):
+        log = (path / "log.liggghts").read_text(errors="replace")
+        thermo = parse_thermo(log)
+        points = int(thermo[-1]["Atoms"][0]) if thermo and "Atoms" in thermo[-1] else 0
+        particle_steps = thermo[-1].get("mpm[12]", [0])[-1] if thermo else 0
+        dem_steps = round(particle_steps / (points * grains)) if points and grains else 0
+        return Run(path, done["seconds"], points, grains, dem_steps, thermo)
+
+    def check(self, quantity, error, bound, run, seconds=None):
+        """error <= bound passes; both in the unit that the quantity's name tells. bound None: for information."""
+        error = float(error)
+        self.rows.append({"case": self.case, "quantity": quantity, "error": error, "bound": bound,
+                          "pass": None if bound is None else bool(error <= bound),
+                          "seconds": run.seconds if seconds is None else seconds, "points": run.points, "grains": run.grains,
+                          "dem_steps": run.dem_steps})
+        verdict = "" if bound is None else f" <= {bound:g} {'ok' if error <= bound else 'FAILS'}"
+        print(f"  {self.case}: {quantity}: {error:.3g}{verdict}  ({run.seconds:.0f} s)", flush=True)
+
+    def note(self, text):
+        """A sentence for the report."""
+        self.notes.append(text)
+        print(f"  {self.case}: {text}", flush=True)
+
+    def save(self, figure, name):
+        """A figure of the report."""
+        path = self.folder.parent / f"{name}.png"
+        figure.savefig(path, dpi=100, bbox_inches="tight")
+        plt.close(figure)
+        self.figures.append(path.name)
+
+    def pack(self, name, **settings):
+        """A packing by dempm-pack, made once; its path."""
+        path = self.folder / f"{name}.packing"
+        words = [word for key, value in settings.items() for word in (key, *(value if isinstance(value, tuple) else (value,)))]
+        mark = path.with_suffix(".made")
+        if not (path.exists() and mark.exists() and mark.read_text() == str(words)):
+            subprocess.run([str(w) for w in (BUILD / "dempm-pack", "generate", path, *words)], check=True, stdout=subprocess.PIPE,
+                           env=environment(THREADS))
+            mark.write_text(str(words))
+        return path
+
+    def element(self, name, packing, path, **settings):
+        """An element test by dempm-rve; its columns as arrays. `__` in a name stands for `/`."""
+        out = self.folder / f"{name}.csv"
+        sets = [word for key, value in settings.items() for word in ("--set", f"{key.replace('__', '/')}={value}")]
+        subprocess.run([str(w) for w in (BUILD / "dempm-rve", "run", packing, "--path", path, "--dimension", 2, "--out", out, *sets)],
+                       check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment(THREADS))
+        return np.genfromtxt(out, delimiter=",", names=True)
