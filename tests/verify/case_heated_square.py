@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""TM-DEMPM 5.2.2: the square heated on all sides, continuum and packings of 400 disks of many sizes, against series.
+
+The continuum has the 2D moduli K and G that the packing shows under small uniaxial compression (dempm-rve). Stresses are those that heating
+adds to the confinement. Quick: the packings on a coarser grid and until 0.5 s; full: 40 x 40, 1 s."""
+import subprocess
+
+import numpy as np
+from study import BUILD, THREADS, plt
+
+from conftest import environment
+from exact import square_centre_stress, square_mean_temperature, square_temperature
+
+EXPANSION, PIPE, HOT = 1e-4, 2.08e4, 75.0
+GRAINS = ["density=2650", "kn=1e6", "kt=1e6", "mu=0.5", "thickness=0.075", "damping/local=0.7", f"expansion={EXPANSION}", "Tref=0",
+          f"alpha={PIPE}"]
+STRAIN = 1e-3
+
+
+def program(study, name, *words):
+    done = subprocess.run([str(BUILD / name), *map(str, words)], cwd=study.folder, env=environment(1), capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{name}: {done.stdout}{done.stderr}")
+
+
+def make_packing(study):
+    program(study, "dempm-pack", "generate", "dense.packing", "grains", 400, "radius", 0.0025, 0.005, "pressure", 1e5,
+            "preparation_friction", 0.01, "density", 2650, "kn", 1e6, "kt", 1e6, "thickness", 0.075)
+    return study.folder / "dense.packing"
+
+
+def element(study, name, rows):
+    """One packing through a path of (time, Lxx, Lyy, T); the columns of the answer."""
+    (study.folder / f"{name}.path").write_text("time, Lxx, Lyy, T\n" + "".join(", ".join(map(str, row)) + "\n" for row in rows))
+    program(study, "dempm-rve", "run", "dense.packing", "--path", f"{name}.path", "--dimension", 2, "--out", f"{name}.csv",
+            *(word for setting in GRAINS for word in ("--set", setting)))
+    return np.genfromtxt(study.folder / f"{name}.csv", delimiter=",", names=True)
+
+
+def probe(study, axis, heat):
+    """K and G by compression along one axis, after heating in a fixed cell."""
+    warm, rest, rate = 0.05, 0.06, STRAIN / 0.002
+    still = (0, 0)
+    push = (-rate, 0) if axis == "x" else (0, -rate)
+    answer = element(study, f"probe_{axis}_{heat:g}", [(0, *still, 0), (warm, *still, heat), (rest, *push, heat),
+                                                       (rest + 0.002, *still, heat)])
+    start = np.argmin(np.abs(answer["time"] - rest))
+    along, across = ("sxx", "syy") if axis == "x" else ("syy", "sxx")
+    stiff, side = (-(answer[c][-1] - answer[c][start]) / (STRAIN * (answer["time"][-1] - answer["time"][start]) / 0.002)
+                   for c in (along, across))
+    return 0.5 * (stiff + side), 0.5 * (stiff - side)
+
+
+def history(run, law, cells, dt):
+    """t; [time][centre's T, sxx, syy, sxy], [time][mean sxx, syy]; worst error of T beside `conductivity` is left to the caller."""
+    frames, start = [], None
+    for step, columns in run.dump(f"square_{law}.dump"):
+        number = np.array(columns["f_mpm[30]"]).astype(int) - 1
+        field = np.empty((6, cells * cells))
+        field[:, number] = [columns[c] for c in ("x", "y", "f_mpm[13]", "f_mpm[1]", "f_mpm[2]", "f_mpm[4]")]
+        start = field[3:].mean(axis=1)[:, None] if start is None else start
+        field[3:] -= start
+        frames.append((step * dt, field.reshape(6, cells, cells)))
+    return frames[1:]
+
+
+def centre(frames, cells):
+    middle = slice(cells // 2 - 1, cells // 2 + 1)
+    return np.array([t for t, _ in frames]), np.array([field[2:, middle, middle].mean(axis=(1, 2)) for _, field in frames])
+
+
+def temperature_error(frames, cells, warm=lambda t: t):
+    """Largest error at the four points round the centre; warm(t) is the time that a conductivity of 0.1 needs for the same heat."""
+    worst = 0.0
+    for t, field in frames:
+        for j in (cells // 2 - 1, cells // 2):
+            for i in (cells // 2 - 1, cells // 2):
+                x, y, heat = field[:3, j, i]
+                worst = max(worst, abs(heat - square_temperature(np.array([x]), np.array([y]), warm(t))[0]))
+    return worst
+
+
+def warming(study):
+    """Time at a conductivity of 0.1 that warms as much as the packing's own conductivity, which grows with its pressure: from
+    heating in a fixed cell, at the square's mean temperature."""
+    answer = element(study, "heating", [(0, 0, 0, 0), (0.1, 0, 0, 100)])
+    conductivity = 0.5 * (answer["Kxx"] + answer["Kyy"])
+    times = np.linspace(0, 1, 401)
+    scaled = np.zeros_like(times)
+    for k in range(1, len(times)):
+        mean = square_mean_temperature(scaled[k - 1] + 0.5 * (times[k] - times[k - 1]))
+        scaled[k] = scaled[k - 1] + (times[k] - times[k - 1]) * np.interp(mean, answer["T"], conductivity) / 0.1
+    return answer, lambda t: np.interp(t, times, scaled)
+
+
+def compare_continuum(study, moduli, cells, dt, time, name):
+    bulk, shear = moduli
+    ratio = (bulk - shear) / (bulk + shear)
+    run = study.run(name, "in.heated_square", {"law": "elastic", "cells": cells, "dt": dt, "time": time, "poisson": ratio,
+                                               "young": 2 * bulk * (1 - ratio)}, folders=["heated_square"], threads=1)
+    frames = history(run, "elastic", cells, dt)
+    times, values = centre(frames, cells)
+    study.check(f"continuum, {cells} x {cells}: temperature at the centre, % of the step", temperature_error(frames, cells), 0.5, run)
+    still = np.array([square_centre_stress(t, bulk, shear, EXPANSION) for t in times])
+    mean = np.array([-2 * bulk * EXPANSION * square_mean_temperature(t) for t in times])
+    area = np.array([field[3:5].mean(axis=(1, 2)) for _, field in frames])
+    last = abs(still[-1])
+    study.check(f"continuum, {cells} x {cells}: mean stress, % of its last value", 100 * np.max(np.abs(area - mean[:, None])) / abs(mean[-1]),
+                1, run)
+    calm = times > 0.5 * times[-1]
+    study.check(f"continuum, {cells} x {cells}: stress at the centre beside the series without inertia, mean over the second half, %",
+                100 * abs(np.mean((values[:, 1] - still)[calm])) / last, 2, run)
+    return times, values
+
+
+def verify(study):
+    packing = make_packing(study)
+    probes = {(axis, heat): probe(study, axis, heat) for axis in "xy" for heat in (0.0, HOT)}
+    for (axis, heat), (bulk, shear) in probes.items():
+        study.note(f"probed along {axis} at {heat:g} C: K {bulk / 1e6:.2f} MPa, G {shear / 1e6:.2f} MPa (paper: 7.29 and 5.11)")
+    heating, warm = warming(study)
+    study.note(f"conductivity in a fixed cell: {heating['Kxx'][0]:.4f} and {heating['Kyy'][0]:.4f} W/(m K) along x and y at 0 C, "
+               f"{heating['Kxx'][-1]:.4f} and {heating['Kyy'][-1]:.4f} at 100 C: the pressure closes contacts")
+    cold = np.mean([probes[axis, 0.0] for axis in "xy"], axis=0)
+    fine = compare_continuum(study, cold, 40, 1.5e-4 if not study.full else 1e-4, 0.99 if not study.full else 1.0, "continuum")
+    cells, dt, time = (40, 1e-4, 1.0) if study.full else (16, 2.5e-4, 0.5)
+    run = study.run("packings", "in.heated_square", {"law": "rve", "cells": cells, "dt": dt, "time": time, "pipe": PIPE},
+                    folders=["heated_square"], files=[packing], grains=400, threads=THREADS)
+    frames = history(run, "rve", cells, dt)
+    times, values = centre(frames, cells)
+    study.check("400 disks: temperature at the centre beside k = 0.1, % of the step", temperature_error(frames, cells), None, run)
+    study.check("400 disks: temperature at the centre beside the packing's own conductivity, % of the step",
+                temperature_error(frames, cells, warm), 0.5, run)
+    judge_stress(study, run, probes, times, values)
+    draw(study, probes, warm, fine, (times, values))
+
+
+def judge_stress(study, run, probes, times, values):
+    """Both normal stresses lie between the series with the smallest and the largest probed moduli, waves averaged out."""
+    calm = times > 0.5 * times[-1]
+    still = np.array([[square_centre_stress(t, *moduli, EXPANSION) for moduli in probes.values()] for t in times])
+    low, high = still.min(axis=1)[calm].mean(), still.max(axis=1)[calm].mean()
+    for name, stress in (("xx", values[calm, 1].mean()), ("yy", values[calm, 2].mean())):
+        outside = max(low - stress, stress - high, 0.0)
+        study.check(f"400 disks: s{name} at the centre outside of the probed moduli's bounds, mean over the second half, %",
+                    100 * outside / abs(low), 0, run)
+    difference = (values[calm, 1] - values[calm, 2]).mean() / (0.5 * (values[calm, 1] + values[calm, 2])).mean()
+    study.check("400 disks: anisotropy, (sxx - syy) / mean, %", 100 * abs(difference), None, run)
+    study.note(f"stress at the centre, mean over the second half: xx {values[calm, 1].mean() / 1e3:.2f}, yy "
+               f"{values[calm, 2].mean() / 1e3:.2f} kPa; bounds {low / 1e3:.2f} to {high / 1e3:.2f} kPa")
+
+
+def draw(study, probes, warm, continuum, packings):
+    figure, axes = plt.subplots(1, 2, figsize=(14, 5))
+    centre_point = np.array([0.5])
+    moments = np.linspace(0.01, 1.0, 200)
+    axes[0].plot(moments, [square_temperature(centre_point, centre_point, t)[0] for t in moments], "k", label="series, k = 0.1")
+    axes[0].plot(moments, [square_temperature(centre_point, centre_point, warm(t))[0] for t in moments], "k--", lw=0.8,
+                 label="series, the packing's k")
+    bounds = np.array([[square_centre_stress(t, *m, EXPANSION) for m in probes.values()] for t in moments]) / 1e3
+    axes[1].fill_between(moments, bounds.min(axis=1), bounds.max(axis=1), color="0.85", label="series, probed moduli")
+    for (times, values), color, label in ((continuum, "C0", "continuum"), (packings, "C1", "400 disks per point")):
+        axes[0].plot(times, values[:, 0], color + "o", ms=3, label=label)
+        axes[1].plot(times, values[:, 1] / 1e3, color, lw=1, label=f"{label}, xx")
+        if color == "C1":
+            axes[1].plot(times, values[:, 2] / 1e3, "C3", lw=1, label=f"{label}, yy")
+    axes[0].set(xlabel="t, s", title="T at the centre, C")
+    axes[1].set(xlabel="t, s", title="stress by heating at the centre, kPa")
+    for axis in axes:
+        axis.legend()
+        axis.grid(alpha=0.3)
+    study.save(figure, "heated_square")
