@@ -40,7 +40,7 @@ def test_heated_bar_follows_the_closed_form(dempm, transfer):
     behind = []
     for step, x0, x, temperature, stress in profile(run, "bar.dump", 300, 6.0):
         t = step * 1e-4
-        if step == 0:
+        if step == 0 or step % 500:
             continue
         exact_stress, exact_displacement = danilovskaya(x0, t)
         at_one = lambda values: 0.5 * (values[49] + values[50])

