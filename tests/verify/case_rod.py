@@ -77,7 +77,7 @@ def check_ringing(study):
 
 
 def draw(study, found, waves):
-    figure, axes = plt.subplots(2, 3, figsize=(16, 8))
+    figure, axes = plt.subplots(2, 3, figsize=(12.5, 6.5))
     for row, law in enumerate(("elastic", "rve")):
         times, place, temperature, stress = found[law]
         for share, color in ((0.05, "C0"), (0.1, "C1"), (0.2, "C2"), (0.5, "C3"), (1.0, "C4")):
