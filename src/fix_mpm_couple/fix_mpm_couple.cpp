@@ -255,15 +255,15 @@ int FixMPMCouple::find_point_type() {
   return all[1];
 }
 
-/* Before LIGGGHTS drops particles beyond a fixed boundary, and before a body smaller than a cell moves like one point. */
+/* Before LIGGGHTS drops particles beyond a fixed boundary, and a body smaller than a cell moves like one point. */
 void FixMPMCouple::check_place() {
   BaseStatus status = BASE_OK;
   for (int i = 0; i < atom->nlocal && !delete_leaving_; i++)
     if (status == BASE_OK && is_point(i) && is_outside(atom->x[i]))
       status = base_error(BASE_ERROR_ARGUMENT,
-                          "the material point with particle id %d, at (%g, %g, %g), is outside of the box, which reaches "
-                          "from (%g, %g, %g) to (%g, %g, %g) with a fixed boundary; make the box larger, or let points go by "
-                          "'leaving delete'",
+                          "the material point with particle id %d, at (%g, %g, %g), is outside of the box, which "
+                          "reaches from (%g, %g, %g) to (%g, %g, %g) with a fixed boundary; make the box larger, or let "
+                          "points go by 'leaving delete'",
                           atom->tag[i], atom->x[i][0], atom->x[i][1], atom->x[i][2], domain->boxlo[0], domain->boxlo[1],
                           domain->boxlo[2], domain->boxhi[0], domain->boxhi[1], domain->boxhi[2]);
   fix_check(lmp, this, status);
@@ -272,8 +272,8 @@ void FixMPMCouple::check_place() {
   for (int k = 0; k < domain->dimension; k++) largest = MAX(largest, high[k] - low[k] + size0_[k]);
   if (count_points(false) > 1 && largest < scene_.spacing)
     fix_failed(lmp, this,
-               format_text("keyword 'grid': cells of %g m are coarser than the body of material points, whose longest edge is "
-                           "%g m; allowed: cells smaller than the body",
+               format_text("keyword 'grid': cells of %g m are coarser than the body of material points, whose longest "
+                           "edge is %g m; allowed: cells smaller than the body",
                            scene_.spacing, largest));
 }
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""TM-DEMPM 5.2.1: the rod between two fixed ends, continuum and packings (square lattice of 400 disks), against series.
+"""TM-DEMPM 5.2.1: the rod between two fixed ends, continuum and packings (square lattice of 400 disks), against
+series.
 
-Stresses are those that heating adds to the confinement. The mean stress is exact at all times; pointwise the exact solution without
-damping rings for ever (exact.rod_ringing)."""
+Stresses are those that heating adds to the confinement. The mean stress is exact at all times; pointwise the exact
+solution without damping rings for ever (exact.rod_ringing)."""
 import numpy as np
 from study import plt
 
@@ -113,8 +114,8 @@ def verify(study):
     lattice = study.run("lattice", "in.lattice", folders=["rod"], threads=1).path / "lattice.data"
     found, runs = {}, {}
     for law in ("elastic", "rve"):
-        runs[law] = study.run(law, "in.rod", {"law": law}, folders=["rod"], files=[lattice], grains=400 if law == "rve" else 0,
-                              **({} if law == "rve" else {"threads": 1}))
+        cost = {"grains": 400} if law == "rve" else {"threads": 1}
+        runs[law] = study.run(law, "in.rod", {"law": law}, folders=["rod"], files=[lattice], **cost)
         found[law] = history(runs[law], law)
         compare(study, runs[law], "400 disks" if law == "rve" else "elastic", found[law])
     (_, x1, t1, s1), (_, x2, t2, s2) = found["elastic"], found["rve"]

@@ -5,10 +5,12 @@ from scipy.special import erf, erfc, erfcx
 
 
 def _fronts(x, t):
-    """exp(t - x) erfc(x / (2 sqrt t) - sqrt t) and exp(t + x) erfc(x / (2 sqrt t) + sqrt t), for t > 0, without overflow."""
+    """exp(t - x) erfc(x / (2 sqrt t) - sqrt t) and exp(t + x) erfc(x / (2 sqrt t) + sqrt t), for t > 0, without
+    overflow."""
     a, r = x / (2 * np.sqrt(t)), np.sqrt(t)
     decay = np.exp(-a * a)
-    minus = np.where(a >= r, erfcx(np.abs(a - r)) * decay, 2 * np.exp(np.minimum(t - x, 500)) - erfcx(np.abs(a - r)) * decay)
+    small = erfcx(np.abs(a - r)) * decay
+    minus = np.where(a >= r, small, 2 * np.exp(np.minimum(t - x, 500)) - small)
     return minus, erfcx(a + r) * decay
 
 
@@ -31,7 +33,8 @@ def danilovskaya_held(x, t):
 
 
 def slab_warming(x, t, kappa):
-    """(T1 - T) / (T1 - T0) of a slab of thickness 1 with x = 0 held at T1 and x = 1 insulated: images; kappa t < 0.5."""
+    """(T1 - T) / (T1 - T0) of a slab of thickness 1 with x = 0 held at T1 and x = 1 insulated: images; kappa t <
+    0.5."""
     return sum((-1) ** k * erf((x + 2 * k) / (2 * np.sqrt(kappa * t))) for k in range(-8, 9))
 
 
@@ -66,14 +69,16 @@ def rod_ringing(x, t, speed, kappa=0.1, hot=100.0, modes=400):
     large = q.real > 300
     bounded = np.where(large, 1, q)
     ends = np.where(large, 1, (np.cosh(bounded) - (-1.0) ** n) / np.sinh(bounded))
-    factor = 2 * (-hot / (rate - 1j * w) * np.sqrt(rate / (1j * w)) * ends * speed * (-1.0) ** n * np.exp(1j * w * t)).real
+    residue = -hot / (rate - 1j * w) * np.sqrt(rate / (1j * w)) * ends * speed * (-1.0) ** n
+    factor = 2 * (residue * np.exp(1j * w * t)).real
     return np.sum(factor * np.cos(n * np.pi * X), axis=0), np.sum(factor / (n * np.pi) * np.sin(n * np.pi * X), axis=0)
 
 
 def square_temperature(x, y, t, kappa=0.1, hot=100.0):
     """Of a square of edge 1, initially 0, its edges at `hot` (product form: eq. 59 corrected)."""
     n = (2 * np.arange(60) + 1)[:, None]
-    one = lambda z: np.sum(4 / (n * np.pi) * np.sin(n * np.pi * z[None, :]) * np.exp(-((n * np.pi) ** 2) * kappa * t), axis=0)
+    decay = 4 / (n * np.pi) * np.exp(-((n * np.pi) ** 2) * kappa * t)
+    one = lambda z: np.sum(decay * np.sin(n * np.pi * z[None, :]), axis=0)
     return hot * (1 - one(x) * one(y))
 
 
@@ -84,7 +89,8 @@ def square_mean_temperature(t, kappa=0.1, hot=100.0):
 
 
 def square_centre_stress(t, bulk, shear, beta, kappa=0.1, hot=100.0):
-    """Normal stresses at the centre without inertia, edges held along their normals; 2D moduli: lambda = bulk - shear."""
+    """Normal stresses at the centre without inertia, edges held along their normals; 2D moduli: lambda = bulk -
+    shear."""
     centre = square_temperature(np.array([0.5]), np.array([0.5]), t, kappa, hot)[0]
     modulus = bulk + shear
     return -2 * bulk * beta * (shear / modulus * centre + bulk / modulus * square_mean_temperature(t, kappa, hot))

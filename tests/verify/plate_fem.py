@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Reference of the heated plate (TM-DEMPM 5.1.2): bilinear finite elements, central differences.
 
-Edges x = 0 and y = 0 of a unit square are suddenly heated and held along their normals, the others are free and insulated.
-The heated edges send off plane waves whose fronts have square-root cusps, which no mesh resolves. With subtract=True these waves
-enter in closed form, and the elements carry the rest only: the heat that the waves' half spaces do not have, and the tractions
-that free the edges x = 1 and y = 1. Unit density; stresses in E beta (T1 - T0). Valid until a wave reaches the other side."""
+Edges x = 0 and y = 0 of a unit square are suddenly heated and held along their normals, the others are free and
+insulated. The heated edges send off plane waves whose fronts have square-root cusps, which no mesh resolves. With
+subtract=True these waves enter in closed form, and the elements carry the rest only: the heat that the waves' half
+spaces do not have, and the tractions that free the edges x = 1 and y = 1. Unit density; stresses in E beta (T1 - T0).
+Valid until a wave reaches the other side."""
 import numpy as np
 import scipy.sparse as sparse
 from scipy.special import erfc
