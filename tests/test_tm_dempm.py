@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""TM-DEMPM 5.1.1 and 5.2.1 from the scripts in examples/, against closed forms (corrected as in doc/theory.md)."""
+"""TM-DEMPM 5.1.1, 5.1.2 and 5.2.1 from the scripts in examples/, against closed forms (corrected as in doc/theory.md)."""
+import pathlib
+import sys
+
 import numpy as np
 import pytest
 from scipy.special import erfc
 
 from conftest import ROOT
-from verify.exact import danilovskaya, rod_temperature
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent / "verify"))
+from exact import danilovskaya, rod_temperature  # noqa: E402
+from plate_fem import Plate  # noqa: E402
 
 EXAMPLES = ROOT / "examples"
 
@@ -28,12 +34,13 @@ BAR_BOUNDS = {"flip 0.9999": (0.015, 0.02, 0.07), "apic": (0.004, 0.002, 0.05), 
 def test_heated_bar_follows_the_closed_form(dempm, transfer):
     """At x = 1: T within 0.2 % of T1 at all times; displacement (largest 1.23) and stress for abs(t - 1) > 0.1. Behind the front of
     one jump every grid method rings or smears (errata), hence the rms there."""
-    run = dempm(EXAMPLES / "heated_bar" / "in.heated_bar", variables={"transfer": transfer}, timeout=300)
+    run = dempm(EXAMPLES / "heated_bar" / "in.heated_bar", timeout=300,
+                variables={"transfer": transfer, "points": 300, "dt": 1e-4})
     displacement_bound, stress_bound, rms_bound = BAR_BOUNDS[transfer]
     behind = []
     for step, x0, x, temperature, stress in profile(run, "bar.dump", 300, 6.0):
         t = step * 1e-4
-        if step == 0:
+        if step == 0 or step % 500:
             continue
         exact_stress, exact_displacement = danilovskaya(x0, t)
         at_one = lambda values: 0.5 * (values[49] + values[50])
@@ -46,6 +53,25 @@ def test_heated_bar_follows_the_closed_form(dempm, transfer):
             else:
                 behind.append(error)
     assert len(behind) == 38 and np.sqrt(np.mean(np.square(behind))) < rms_bound
+
+
+@pytest.mark.parametrize("mode", ["plane_strain", "plane_stress"])
+def test_heated_plate_follows_finite_elements(dempm, mode):
+    """At the points next to A, B, C: T within 0.5 %; stress within 2 % of its largest until the front is 3 cells away."""
+    run = dempm(EXAMPLES / "heated_plate" / "in.heated_plate", variables={"mode": mode}, timeout=120)
+    plate, compared = Plate(mode, 80), 0
+    for x, y in ((0.5125, 0.5125), (0.6125, 0.5125), (0.6125, 0.6125)):
+        largest = max(np.max(np.abs(plate.at(x, y, t)[1:])) for t in np.linspace(0.02, 0.5, 97))
+        for step, columns in run.dump("plate.dump")[1:]:
+            t = step * 1e-3
+            point = columns["f_mpm[30]"].index(40 * int(y * 40) + int(x * 40) + 1)
+            found = np.array([columns[f"f_mpm[{k}]"][point] / (1 if k == 13 else 1e-6) for k in (13, 1, 2, 4)])
+            error = np.abs(found - plate.at(x, y, t))
+            assert error[0] < 0.005
+            if t * plate.speed < y - 0.075:
+                compared += 1
+                assert np.max(error[1:]) < 0.02 * largest
+    assert compared > 100
 
 
 @pytest.fixture(scope="module")

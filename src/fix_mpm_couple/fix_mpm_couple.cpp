@@ -183,6 +183,7 @@ void FixMPMCouple::init() {
   check_domain();
   check_other_fixes();
   const int type = find_point_type();
+  check_place();
   destroy_mpm();
   create_law(type);
   create_mpm();
@@ -255,6 +256,28 @@ int FixMPMCouple::find_point_type() {
             "the particles of group %s have atom types %d to %d; all material points of a fix must have one type",
             group->names[igroup], -all[0], all[1]));
   return all[1];
+}
+
+/* Before LIGGGHTS drops particles beyond a fixed boundary, and a body smaller than a cell moves like one point. */
+void FixMPMCouple::check_place() {
+  BaseStatus status = BASE_OK;
+  for (int i = 0; i < atom->nlocal && !delete_leaving_; i++)
+    if (status == BASE_OK && is_point(i) && is_outside(atom->x[i]))
+      status = base_error(BASE_ERROR_ARGUMENT,
+                          "the material point with particle id %d, at (%g, %g, %g), is outside of the box, which "
+                          "reaches from (%g, %g, %g) to (%g, %g, %g) with a fixed boundary; make the box larger, or let "
+                          "points go by 'leaving delete'",
+                          atom->tag[i], atom->x[i][0], atom->x[i][1], atom->x[i][2], domain->boxlo[0], domain->boxlo[1],
+                          domain->boxlo[2], domain->boxhi[0], domain->boxhi[1], domain->boxhi[2]);
+  fix_check(lmp, this, status);
+  double low[3], high[3], largest = 0.0;
+  find_bounds(low, high);
+  for (int k = 0; k < domain->dimension; k++) largest = MAX(largest, high[k] - low[k] + size0_[k]);
+  if (count_points(false) > 1 && largest < scene_.spacing)
+    fix_failed(lmp, this,
+               format_text("keyword 'grid': cells of %g m are coarser than the body of material points, whose longest "
+                           "edge is %g m; allowed: cells smaller than the body",
+                           scene_.spacing, largest));
 }
 
 void FixMPMCouple::create_law(int type) {

@@ -168,6 +168,7 @@ class FixMPMCouple : public Fix {
   void check_domain();
   void check_other_fixes();
   int find_point_type();
+  void check_place();
   void find_bounds(double low[3], double high[3]);
   void create_law(int type);
   void create_elastic_law(int type);

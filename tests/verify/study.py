@@ -51,11 +51,13 @@ class Study:
         self.folder.mkdir(parents=True, exist_ok=True)
         self.rows, self.notes, self.figures = [], [], []
 
-    def run(self, name, script, variables=None, folders=(), files=(), grains=0, timeout=None, ranks=1):
+    def run(self, name, script, variables=None, folders=(), files=(), grains=0, timeout=None, ranks=1, threads=THREADS):
         """Runs a script of examples/ in a folder of its own, with the files of `folders` (of examples/) beside it. A run
-        that has ended with the same variables and the same program is not repeated: its results are read again."""
+        that has ended with the same variables and the same program is not repeated: its results are read again. A variable's
+        value is one word of the command line, spaces and all; a list gives several."""
         path = self.folder / name
-        variables = {key: str(value) for key, value in (variables or {}).items()}
+        variables = {key: [str(v) for v in value] if isinstance(value, (list, tuple)) else [str(value)]
+                     for key, value in (variables or {}).items()}
         program = BUILD / "dempm"
         mark = path / "finished.json"
         wanted = {"script": str(script), "variables": variables, "program": program.stat().st_mtime}
@@ -68,12 +70,12 @@ class Study:
         for file in [f for folder in folders for f in (EXAMPLES / folder).iterdir() if f.is_file()] + list(files):
             shutil.copy(file, path)
         (path / "out").mkdir(exist_ok=True)
-        command = [program, "-in", script] + [w for key, value in variables.items() for w in ("-var", key, *value.split(" "))]
+        command = [program, "-in", script] + [w for key, value in variables.items() for w in ("-var", key, *value)]
         if ranks > 1:
             command = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks), *command]
         start = time.monotonic()
         with open(path / "screen", "w") as screen:
-            code = subprocess.run([str(word) for word in command], cwd=path, env=environment(THREADS // ranks or 1),
+            code = subprocess.run([str(word) for word in command], cwd=path, env=environment(max(threads // ranks, 1)),
                                   stdin=subprocess.DEVNULL, stdout=screen, stderr=subprocess.STDOUT, timeout=timeout).returncode
         if code != 0:
             tail = "\n".join((path / "screen").read_text(errors="replace").splitlines()[-8:])
