@@ -28,6 +28,11 @@ typedef struct MpmPlane {
 } MpmPlane;
 enum { MPM_PLANES_MAX = 32 };
 
+/* Rows `from`, from + 1 ... become rows `to`, to + 1 ..., as far as the next stretch's `to`. */
+typedef struct MpmStretch {
+  int to, from;
+} MpmStretch;
+
 /* The core's own state. Rows: own points by (cell, tag), then foreign ones by (cell, tag); they move only when points
  * change their cells. What only heat, tractions and output need stays in the attached array ("home"), where the point of
  * row k has the place slot[k]. Components of tensors are arrays of their own, so that laws run over them in vectors; in
@@ -63,7 +68,9 @@ typedef struct MpmPoints {
   MpmVec *gathered;    /* XPIC: {1, intermediate velocity} */
   double *carry;       /* slot: scratch for halo->forward */
   unsigned char *moves; /* own rows: leaves its cell */
-  int *from;            /* new row -> old row */
+  int *mover;           /* rows that leave */
+  MpmStretch *stretch;  /* [stretches + 1] by `to`; the last one marks the end */
+  int stretches;
   int *foreign_slot;    /* foreign row - own -> the halo's order */
   MpmItem *item, *spare_item;
   /* Of laws without `advance`: slot, own points. */
