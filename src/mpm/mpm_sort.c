@@ -67,7 +67,8 @@ uint64_t mpm_find_cell(Mpm *mpm, MpmVec position, MpmVec half, int64_t tag) {
   for (int i = mpm->scene.dimension - 1; i >= 0; i--) {
     const double base = floor(anchor[1 + i]);
     if (!(fabs(base) < MPM_KEY_BIAS - 8)) {
-      mpm_note_point(mpm, BASE_ERROR_UNSTABLE, tag, "position is more than 1,000,000 cells away from the grid's origin");
+      mpm_note_point(mpm, BASE_ERROR_UNSTABLE, tag,
+                     "position is more than 1,000,000 cells away from the grid's origin");
       return 0;
     }
     key = key << MPM_KEY_BITS | (uint64_t)((int)base + MPM_KEY_BIAS);

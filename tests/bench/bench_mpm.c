@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Speed of the MPM core without grains: two elastic disks (spheres) that approach, collide and part, USF, FLIP.
- * bench_mpm [cpu] [FILE] [ROUNDS]: the first argument is what every benchmark gets and has no meaning here; FILE gets the
- * figures as JSON. One thread and two threads take turns, so that noise falls on both alike. */
+ * bench_mpm [cpu] [FILE] [ROUNDS]: the first argument is what every benchmark gets and has no meaning here; FILE gets
+ * the figures as JSON. One thread and two threads take turns, so that noise falls on both alike. */
 #include <math.h>
 #include <omp.h>
 #include <stdio.h>
@@ -165,9 +165,12 @@ static int write_json(const char *path, const Case *jobs, int threads) {
 }
 
 int main(int argc, char **argv) {
-  static Case jobs[CASES] = {{.name = "2d_linear", 2, MPM_SHAPE_LINEAR, 200}, {.name = "2d_gimp", 2, MPM_SHAPE_GIMP, 200},
-                             {.name = "2d_bspline", 2, MPM_SHAPE_BSPLINE, 200}, {.name = "3d_linear", 3, MPM_SHAPE_LINEAR, 48},
-                             {.name = "3d_gimp", 3, MPM_SHAPE_GIMP, 48}, {.name = "3d_bspline", 3, MPM_SHAPE_BSPLINE, 48}};
+  static Case jobs[CASES] = {{"2d_linear", 2, MPM_SHAPE_LINEAR, 200, .count = 0},
+                             {"2d_gimp", 2, MPM_SHAPE_GIMP, 200, .count = 0},
+                             {"2d_bspline", 2, MPM_SHAPE_BSPLINE, 200, .count = 0},
+                             {"3d_linear", 3, MPM_SHAPE_LINEAR, 48, .count = 0},
+                             {"3d_gimp", 3, MPM_SHAPE_GIMP, 48, .count = 0},
+                             {"3d_bspline", 3, MPM_SHAPE_BSPLINE, 48, .count = 0}};
   const int threads = omp_get_num_procs() > 1 ? 2 : 1;
   if (argc > 3) rounds = atoi(argv[3]) > 0 && atoi(argv[3]) <= ROUNDS_MAX ? atoi(argv[3]) : 3;
   for (int c = 0; c < CASES; c++) {
@@ -179,8 +182,8 @@ int main(int argc, char **argv) {
           return 1;
         }
     const double middle = median_rate(job);
-    printf("MPM %-10s %6d points, %4d steps: %6.2f million point-steps/s on one core (median %.2f)", job->name, job->count,
-           job->steps, 1e-6 * best_rate(job), 1e-6 * middle);
+    printf("MPM %-10s %6d points, %4d steps: %6.2f million point-steps/s on one core (median %.2f)", job->name,
+           job->count, job->steps, 1e-6 * best_rate(job), 1e-6 * middle);
     if (threads > 1) printf(", two cores %.2f times as fast", scaling(job));
     printf("; momentum %.1e, energy %.4f\n", job->momentum, job->energy);
     fflush(stdout);
