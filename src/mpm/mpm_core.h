@@ -28,10 +28,15 @@ typedef struct MpmPlane {
 } MpmPlane;
 enum { MPM_PLANES_MAX = 32 };
 
+/* Rows `from`, from + 1 ... become rows `to`, to + 1 ..., as far as the next stretch's `to`. */
+typedef struct MpmStretch {
+  int to, from;
+} MpmStretch;
+
 /* The core's own state. Rows: own points by (cell, tag), then foreign ones by (cell, tag); they move only when points
- * change their cells. What only heat, tractions and output need stays in the attached array ("home"), where the point of
- * row k has the place slot[k]. Components of tensors are arrays of their own, so that laws run over them in vectors; in
- * 2D those that do not take part are NULL (`volume0` includes F_zz). */
+ * change their cells. What only heat, tractions and output need stays in the attached array ("home"), where the point
+ * of row k has the place slot[k]. Components of tensors are arrays of their own, so that laws run over them in vectors;
+ * in 2D those that do not take part are NULL (`volume0` includes F_zz). */
 typedef struct MpmPoints {
   MpmPoint *home;     /* [own] borrowed; NULL: nothing attached */
   int own, foreign;   /* of this step */
@@ -63,7 +68,9 @@ typedef struct MpmPoints {
   MpmVec *gathered;    /* XPIC: {1, intermediate velocity} */
   double *carry;       /* slot: scratch for halo->forward */
   unsigned char *moves; /* own rows: leaves its cell */
-  int *from;            /* new row -> old row */
+  int *mover;           /* rows that leave */
+  MpmStretch *stretch;  /* [stretches + 1] by `to`; the last one marks the end */
+  int stretches;
   int *foreign_slot;    /* foreign row - own -> the halo's order */
   MpmItem *item, *spare_item;
   /* Of laws without `advance`: slot, own points. */
@@ -193,7 +200,8 @@ const char *mpm_find_fault(const Mpm *mpm, const MpmPoint *point, BaseStatus *st
 /* mpm_sort.c */
 void mpm_sort_items(MpmItem **item, MpmItem **spare, int n); /* by (cell, tag); the two may change places */
 uint64_t mpm_find_cell(Mpm *mpm, MpmVec position, MpmVec half, int64_t tag); /* 0, and a note, if it is too far away */
-BaseStatus mpm_points_order(Mpm *mpm); /* moves rows of own points that have left their cells; checks that all are finite */
+/* Moves the rows of own points that have left their cells; checks that all are finite. */
+BaseStatus mpm_points_order(Mpm *mpm);
 
 /* mpm_grid.c */
 BaseStatus mpm_grid_build(Mpm *mpm); /* cells, slabs, nodes from the rows */
@@ -236,8 +244,8 @@ void mpm_wall_start(Mpm *mpm);            /* kinematic condition on the nodal ve
 void mpm_wall_update(Mpm *mpm);           /* impulses on the updated velocity; the walls' outputs */
 double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], double normal[3]);
 int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]);
-/* The face of the point's domain, deformed by f, that looks most along the normal: area vector, m2, and its projection on
- * the normal. */
+/* The face of the point's domain, deformed by f, that looks most along the normal: area vector, m2, and its projection
+ * on the normal. */
 double mpm_face_area(const MpmPoint *point, const double f[9], const double normal[3], double area[3]);
 
 /* mpm_traction.c */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* F <- exp(L dt) F: exact volume change, no drift under rotation (verification A4). Four points at once, one per lane.
- * Increments of the usual size take series without branches, larger ones the general way; which way a point goes depends
- * on its own increment alone. */
+ * Increments of the usual size take series without branches, larger ones the general way; which way a point goes
+ * depends on its own increment alone. */
 #ifndef DEMPM_MPM_DEFORM_H
 #define DEMPM_MPM_DEFORM_H
 
@@ -9,7 +9,8 @@
 #include "mpm_shape.h"
 
 /* 1 + x (1 / c[0] + x (1 / c[1] + ...)). */
-#define MPM_SERIES(x, ...) mpm_series((x), (const double[]){__VA_ARGS__}, sizeof(double[]){__VA_ARGS__} / sizeof(double))
+#define MPM_SERIES(x, ...) \
+  mpm_series((x), (const double[]){__VA_ARGS__}, sizeof(double[]){__VA_ARGS__} / sizeof(double))
 MPM_INLINE MpmVec mpm_series(MpmVec x, const double *divisor, size_t terms) {
   MpmVec sum = mpm_vec_all(1.0 / divisor[terms - 1]);
 #pragma GCC unroll 10
@@ -40,8 +41,8 @@ MPM_INLINE void mpm_deform_small_plane(const MpmVec l[9], double dt, MpmVec f[9]
   f[3] = e2 * f0 + e3 * f[3], f[4] = e2 * f1 + e3 * f[4];
 }
 
-/* Space: A = s I + B, s = tr A / 3. B^3 = p B + q I (Cayley and Hamilton) with p = tr B^2 / 2, q = det B, hence exp(B) =
- * c0 I + c1 B + c2 B^2, series in p and q. Up to B^8, as here, they reach round-off for a norm of B below 0.06. */
+/* Space: A = s I + B, s = tr A / 3. B^3 = p B + q I (Cayley and Hamilton) with p = tr B^2 / 2, q = det B, hence exp(B)
+ * = c0 I + c1 B + c2 B^2, series in p and q. Up to B^8, as here, they reach round-off for a norm of B below 0.06. */
 MPM_INLINE MpmMask mpm_is_small_space(const MpmVec l[9], double dt) {
   const MpmVec limit = mpm_vec_all(0.01 / dt);
   MpmMask small = (l[0] < limit) & (l[0] > -limit);

@@ -15,8 +15,8 @@ typedef struct Elastic {
   double thermal;    /* Pa/K */
 } Elastic;
 
-/* sigma <- R sigma R^T with R = (I - W/2)^-1 (I + W/2), W the spin times dt. Four points at once, one per lane, as in all
- * that follows. */
+/* sigma <- R sigma R^T with R = (I - W/2)^-1 (I + W/2), W the spin times dt. Four points at once, one per lane, as in
+ * all that follows. */
 MPM_INLINE void rotate(const MpmVec spin[3], MpmVec stress[6]) {
   /* spin = (W_zy, W_xz, W_yx): the axial vector w with W a = w x a. R = I + 2/(1+q.q) (Q + Q Q), q = w/2. */
   const MpmVec x = 0.5 * spin[0], y = 0.5 * spin[1], z = 0.5 * spin[2];

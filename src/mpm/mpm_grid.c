@@ -159,9 +159,9 @@ static BaseStatus add_runs(MpmGrid *grid, const MpmPoints *p, const int own[2], 
   return BASE_OK;
 }
 
-static int cell_end(const MpmPoints *p, int row, int end) {
+static int cell_end(const MpmPoints *p, int row, int end, uint64_t key) {
   int k = row;
-  while (k < end && p->key[k] == p->key[row]) k++;
+  while (k < end && p->key[k] == key) k++;
   return k;
 }
 
@@ -174,10 +174,11 @@ static BaseStatus list_cells(Mpm *mpm, int *changed) {
   grid->runs = 0;
   *changed = 0;
   while (own < own_end || foreign < end) {
-    const uint64_t key = foreign == end || (own < own_end && p->key[own] <= p->key[foreign]) ? p->key[own] : p->key[foreign];
+    const int own_first = foreign == end || (own < own_end && p->key[own] <= p->key[foreign]);
+    const uint64_t key = p->key[own_first ? own : foreign];
     if (cells == grid->cell_room) TRY(reserve_cells(grid, cells + 1));
-    const int own_range[2] = {own, own < own_end && p->key[own] == key ? cell_end(p, own, own_end) : own};
-    const int foreign_range[2] = {foreign, foreign < end && p->key[foreign] == key ? cell_end(p, foreign, end) : foreign};
+    const int own_range[2] = {own, cell_end(p, own, own_end, key)};
+    const int foreign_range[2] = {foreign, cell_end(p, foreign, end, key)};
     *changed |= cells >= grid->cells || grid->cell_key[cells] != key;
     grid->cell_key[cells] = key;
     grid->cell_first[cells] = own;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* What P2G and G2P share: weights of a row, stretches of rows, sums over the nodes of a support. Each body is written once
- * and compiled for two dimensions x three shapes (see mpm_shape.h). */
+/* What P2G and G2P share: weights of a row, stretches of rows, sums over the nodes of a support. Each body is written
+ * once and compiled for two dimensions x three shapes (see mpm_shape.h). */
 #ifndef DEMPM_MPM_KERNEL_H
 #define DEMPM_MPM_KERNEL_H
 
@@ -98,8 +98,8 @@ MPM_INLINE void mpm_gather_gradient(const MpmVec *field, const int *row, const M
   }
 }
 
-/* The load of one own row: load[0] = {0, N}, load[1 + j] = what meets the slope of S along j, -V sigma_ij (TM-DEMPM eq. 18);
- * slopes are per unit of x / h, hence 1 / h. */
+/* The load of one own row: load[0] = {0, N}, load[1 + j] = what meets the slope of S along j, -V sigma_ij (TM-DEMPM eq.
+ * 18); slopes are per unit of x / h, hence 1 / h. */
 MPM_INLINE void mpm_row_load(const Mpm *mpm, int k, int dimension, MpmVec *load) {
   const MpmPoints *p = &mpm->points;
   double *const *f = p->deformation_gradient, *const *s = p->stress;

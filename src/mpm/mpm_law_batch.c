@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Between points and constitutive law, and the loads that its answers put on the grid. A local law works on the rows where
- * they lie; others get a batch in the caller's order. */
+/* Between points and constitutive law, and the loads that its answers put on the grid. A local law works on the rows
+ * where they lie; others get a batch in the caller's order. */
 #include <math.h>
 #include <string.h>
 
@@ -85,7 +85,8 @@ MPM_CLONES static void check_rows(Mpm *mpm, int first, int end) {
 void mpm_law_rows(Mpm *mpm, int first, int end) {
   const MpmPoints *p = &mpm->points;
   MpmLawRows rows = {.n = end - first, .dimension = mpm->scene.dimension, .dt = mpm->dt};
-  for (int n = 0; n < 9; n++) rows.velocity_gradient[n] = p->velocity_gradient[n] ? p->velocity_gradient[n] + first : NULL;
+  for (int n = 0; n < 9; n++)
+    if (p->velocity_gradient[n]) rows.velocity_gradient[n] = p->velocity_gradient[n] + first;
   for (int n = 0; n < 6; n++) rows.stress[n] = p->stress[n] + first;
   mpm->law->advance(mpm->law->content, &rows);
   deform_rows(mpm, first, end, mpm->dt);

@@ -52,7 +52,8 @@ BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
     TRY(BASE_GROW(0, room, &p->foreign_slot));
   }
   TRY(BASE_GROW(0, room, &p->moves));
-  TRY(BASE_GROW(0, room, &p->from));
+  TRY(BASE_GROW(0, room, &p->mover));
+  TRY(BASE_GROW(0, 3 * room + 2, &p->stretch));
   TRY(BASE_GROW(0, room, &p->item));
   TRY(BASE_GROW(0, room, &p->spare_item));
   p->room = (int)room;
@@ -93,10 +94,10 @@ void mpm_points_free(Mpm *mpm) {
     base_free(rows), base_free(p->spare[n]);
   }
   for (int n = 0; n < 9; n++) base_free(p->velocity_gradient[n]);
-  void *const memory[] = {p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->from, p->foreign_slot,
-                          p->item, p->spare_item, p->law_tag, p->law_velocity_gradient, p->law_deformation_gradient,
-                          p->law_temperature, p->law_temperature_rate, p->batch.stress, p->batch.heat,
-                          p->batch.conductivity, p->batch.modulus, p->batch.scalars};
+  void *const memory[] = {p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->mover, p->stretch,
+                          p->foreign_slot, p->item, p->spare_item, p->law_tag, p->law_velocity_gradient,
+                          p->law_deformation_gradient, p->law_temperature, p->law_temperature_rate, p->batch.stress,
+                          p->batch.heat, p->batch.conductivity, p->batch.modulus, p->batch.scalars};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   memset(p, 0, sizeof *p);
 }
@@ -313,7 +314,10 @@ static void write_point(const Mpm *mpm, int k, int what) {
   MpmPoint *point = &p->home[p->slot[k]];
   const int dimension = mpm->scene.dimension;
   if (what & MPM_WRITE_MOTION) {
-    for (int i = 0; i < dimension; i++) point->position[i] = p->position[k][1 + i], point->velocity[i] = p->motion[k][1 + i];
+    for (int i = 0; i < dimension; i++) {
+      point->position[i] = p->position[k][1 + i];
+      point->velocity[i] = p->motion[k][1 + i];
+    }
     if (p->affine) memcpy(point->affine, p->affine[k], sizeof point->affine);
   }
   if (what & MPM_WRITE_SHAPE) mpm_row_deformation(mpm, k, point->deformation_gradient);

@@ -42,7 +42,8 @@ MPM_INLINE void mpm_vec_store(MpmVec x, double *row, int n) {
 MPM_INLINE MpmVec mpm_vec_positive(MpmVec x) { return (MpmVec)((MpmMask)x & (x > 0.0)); }
 
 /* value[a] = S at node base + a, slope[a] = dS/du, axis by axis. uGIMP: mean of the hat function over [f - half, f +
- * half], half <= 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity. */
+ * half], half <= 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity.
+ */
 MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec value[MPM_WIDTH_MAX],
                                MpmVec slope[MPM_WIDTH_MAX]) {
   if (shape == MPM_SHAPE_LINEAR) {

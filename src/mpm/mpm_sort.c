@@ -67,7 +67,8 @@ uint64_t mpm_find_cell(Mpm *mpm, MpmVec position, MpmVec half, int64_t tag) {
   for (int i = mpm->scene.dimension - 1; i >= 0; i--) {
     const double base = floor(anchor[1 + i]);
     if (!(fabs(base) < MPM_KEY_BIAS - 8)) {
-      mpm_note_point(mpm, BASE_ERROR_UNSTABLE, tag, "position is more than 1,000,000 cells away from the grid's origin");
+      mpm_note_point(mpm, BASE_ERROR_UNSTABLE, tag,
+                     "position is more than 1,000,000 cells away from the grid's origin");
       return 0;
     }
     key = key << MPM_KEY_BITS | (uint64_t)((int)base + MPM_KEY_BIAS);
@@ -159,20 +160,51 @@ static int find_row(const MpmGrid *grid, const MpmPoints *p, const MpmItem *item
   return low;
 }
 
-/* from[new row] = old row. items: sorted movers. */
-static void find_new_rows(Mpm *mpm, int movers) {
+/* Rows from `from` on become rows `to` on; joins the stretch before where it can. */
+static void add_stretch(MpmPoints *p, int to, int from) {
+  const MpmStretch *last = p->stretch + p->stretches - 1;
+  if (p->stretches > 0 && last->from + (to - last->to) == from) return;
+  p->stretch[p->stretches++] = (MpmStretch){to, from};
+}
+
+/* movers: leaving rows, upwards. items: the same, by (cell, tag). */
+static void find_stretches(Mpm *mpm, const int *mover, int movers) {
   MpmPoints *p = &mpm->points;
-  int row = 0, next = 0;
+  int row = 0, next = 0, left = 0;
+  p->stretches = 0;
   for (int m = 0; m <= movers; m++) {
     const int stop = m < movers ? find_row(&mpm->grid, p, &p->item[m]) : p->own;
-    for (; row < stop; row++)
-      if (!p->moves[row]) p->from[next++] = row;
-    if (m < movers) p->from[next++] = p->item[m].index;
+    for (; left < movers && mover[left] < stop; left++) {
+      if (mover[left] > row) add_stretch(p, next, row), next += mover[left] - row;
+      row = mover[left] + 1;
+    }
+    if (stop > row) add_stretch(p, next, row), next += stop - row, row = stop;
+    if (m < movers) add_stretch(p, next++, p->item[m].index);
+  }
+  p->stretch[p->stretches] = (MpmStretch){p->own, 0};
+}
+
+/* New rows [first, end), which begin within stretch s. */
+MPM_INLINE void move_range(const MpmPoints *p, const char *rows, char *spare, size_t width, int s, int first, int end) {
+  for (int to = first; to < end; s++) {
+    const int stop = p->stretch[s + 1].to < end ? p->stretch[s + 1].to : end;
+    const char *from = rows + (size_t)(p->stretch[s].from + (to - p->stretch[s].to)) * width;
+    char *target = spare + (size_t)to * width;
+    if (stop - to > 3) memcpy(target, from, (size_t)(stop - to) * width);
+    else
+      for (int k = 0; k < stop - to; k++) memcpy(target + (size_t)k * width, from + (size_t)k * width, width);
+    to = stop;
   }
 }
 
-MPM_INLINE void move_range(const int *from, const char *rows, char *spare, size_t width, int first, int end) {
-  for (int k = first; k < end; k++) memcpy(spare + (size_t)k * width, rows + (size_t)from[k] * width, width);
+static int find_stretch(const MpmPoints *p, int row) {
+  int low = 0, high = p->stretches - 1;
+  while (low < high) {
+    const int middle = high - (high - low) / 2;
+    if (p->stretch[middle].to <= row) low = middle;
+    else high = middle - 1;
+  }
+  return low;
 }
 
 static void move_rows(Mpm *mpm) {
@@ -180,16 +212,15 @@ static void move_rows(Mpm *mpm) {
   enum { CHUNK = 1024 };
 #pragma omp parallel for schedule(static) num_threads(mpm->threads) if (mpm_is_parallel(mpm))
   for (int first = 0; first < p->own; first += CHUNK) {
-    const int end = first + CHUNK < p->own ? first + CHUNK : p->own;
+    const int end = first + CHUNK < p->own ? first + CHUNK : p->own, s = find_stretch(p, first);
     for (int n = 0; n < p->planes; n++) {
       const MpmPlane *plane = &p->plane[n];
       const char *rows;
       char *spare;
       memcpy(&rows, plane->rows, sizeof rows), memcpy(&spare, plane->spare, sizeof spare);
-      if (plane->width == 4) move_range(p->from, rows, spare, 4, first, end);
-      else if (plane->width == 8) move_range(p->from, rows, spare, 8, first, end);
-      else if (plane->width == 32) move_range(p->from, rows, spare, 32, first, end);
-      else move_range(p->from, rows, spare, plane->width, first, end);
+      if (plane->width == 8) move_range(p, rows, spare, 8, s, first, end);
+      else if (plane->width == 32) move_range(p, rows, spare, 32, s, first, end);
+      else move_range(p, rows, spare, plane->width, s, first, end);
     }
   }
   for (int n = 0; n < p->planes; n++) { /* pointers of several types */
@@ -199,22 +230,37 @@ static void move_rows(Mpm *mpm) {
   }
 }
 
+/* Lists the rows that leave, upwards. */
+static int list_movers(MpmPoints *p, int *mover) {
+  int n = 0;
+  for (int k = 0; k < p->own; k++) {
+    uint64_t eight;
+    if (k % 8 == 0 && k + 8 <= p->own) {
+      memcpy(&eight, p->moves + k, sizeof eight);
+      if (eight == 0) {
+        k += 7;
+        continue;
+      }
+    }
+    if (p->moves[k]) mover[n++] = k;
+    p->moves[k] = 0;
+  }
+  return n;
+}
+
 BaseStatus mpm_points_order(Mpm *mpm) {
   MpmPoints *p = &mpm->points;
   if (mpm->scene.gimp_stretch) stretch_domains(mpm);
-  const int movers = find_movers(mpm);
-  if (movers == 0) return BASE_OK;
-  int n = 0;
-  for (int k = 0; k < p->own; k++) {
-    if (!p->moves[k]) continue;
+  if (find_movers(mpm) == 0) return BASE_OK;
+  const int movers = list_movers(p, p->mover);
+  for (int m = 0; m < movers; m++) {
+    const int k = p->mover[m];
     note_fault(mpm, k);
-    const uint64_t key = mpm_find_cell(mpm, p->position[k], p->half ? p->half[k] : mpm_vec_all(0.5), p->tag[k]);
-    p->item[n++] = (MpmItem){key, p->tag[k], k};
-    p->key[k] = key;
+    p->key[k] = mpm_find_cell(mpm, p->position[k], p->half ? p->half[k] : mpm_vec_all(0.5), p->tag[k]);
+    p->item[m] = (MpmItem){p->key[k], p->tag[k], k};
   }
-  mpm_sort_items(&p->item, &p->spare_item, n);
-  find_new_rows(mpm, n);
-  memset(p->moves, 0, (size_t)p->own);
+  mpm_sort_items(&p->item, &p->spare_item, movers);
+  find_stretches(mpm, p->mover, movers);
   move_rows(mpm);
   p->has_moved = 1;
   for (int k = 1; k < p->own; k++) /* the order of sums would be ambiguous */
