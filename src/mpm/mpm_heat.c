@@ -31,22 +31,32 @@ void mpm_heat_update(Mpm *mpm) {
   }
 }
 
+static void add_flux(Mpm *mpm, MpmWall *wall, const MpmPoint *points, int p, double distance, const double normal[3],
+                     MpmVec *load) {
+  double vector[3];
+  const double area = mpm_face_area(&points[p], normal, vector);
+  const double layer = points[p].volume0 * tensor_determinant(points[p].deformation_gradient) / area;
+  if (!(distance <= layer)) return;
+  load[(size_t)p * (size_t)mpm_load_width(mpm)][0] += wall->flux * area;
+  wall->heat_flow += wall->flux * area;
+}
+
 /* The flux enters through the outermost layer: points whose domain touches the wall, each with the area of its face. */
 void mpm_heat_walls(Mpm *mpm, const MpmPoint *points, MpmVec *load) {
-  const int dimension = mpm->scene.dimension, width = mpm_load_width(mpm);
+  const int dimension = mpm->scene.dimension;
   for (int w = 0; w < mpm->wall_count; w++) {
     MpmWall *wall = &mpm->walls[w];
-    if (wall->heat != MPM_WALL_FLUX) continue;
+    if (wall->heat != MPM_WALL_FLUX || wall->kind == MPM_WALL_SURFACE) continue;
     for (int p = 0; p < mpm->points.own; p++) {
-      const MpmPoint *point = &points[p];
-      double normal[3], vector[3];
-      if (!mpm_wall_in_range(wall, dimension, point->position)) continue;
-      const double distance = mpm_wall_distance(wall, dimension, point->position, normal);
-      const double area = mpm_face_area(point, normal, vector);
-      const double layer = point->volume0 * tensor_determinant(point->deformation_gradient) / area;
-      if (!(distance <= layer)) continue;
-      load[(size_t)p * (size_t)width][0] += wall->flux * area;
-      wall->heat_flow += wall->flux * area;
+      double normal[3];
+      if (!mpm_wall_in_range(wall, dimension, points[p].position, 0.0)) continue;
+      const double distance = mpm_wall_distance(wall, dimension, points[p].position, normal);
+      add_flux(mpm, wall, points, p, distance, normal, load);
     }
+  }
+  for (int k = 0; k < mpm->wall_scratch.nears; k++) {
+    const MpmNear *near = &mpm->wall_scratch.near[k];
+    if (mpm->walls[near->wall].heat == MPM_WALL_FLUX)
+      add_flux(mpm, &mpm->walls[near->wall], points, near->slot, near->distance, near->normal, load);
   }
 }

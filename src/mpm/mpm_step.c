@@ -33,7 +33,7 @@ void mpm_destroy(Mpm *mpm) {
   if (!mpm) return;
   mpm_points_free(mpm);
   mpm_grid_free(&mpm->grid);
-  base_free(mpm->contacts);
+  mpm_wall_free(mpm);
   base_free(mpm->tractions);
   base_free(mpm);
 }
@@ -182,6 +182,7 @@ static BaseStatus advance(Mpm *mpm, MpmPoint *points) {
     if (mpm->scene.transfer == MPM_TRANSFER_XPIC) TRY(mpm_extended_velocity(mpm));
   }
   mpm_g2p_update(mpm, points);
+  if (mpm->scene.mechanical) mpm_wall_guard(mpm, points);
   return BASE_OK;
 }
 
