@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Walls of segments and of meshes: fix mpm/wall ... segment, fix mpm/wall ... mesh with LIGGGHTS' fix mesh/surface."""
+import math
+
+import pytest
+from scripts import HEAD, BOX, POINTS, state, state_dump
+
+
+def stl(*triangles):
+    lines = ["solid mesh"]
+    for triangle in triangles:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += ["vertex {:.9g} {:.9g} {:.9g}".format(*corner) for corner in triangle]
+        lines += ["endloop", "endfacet"]
+    return "\n".join(lines + ["endsolid mesh", ""])
+
+
+def quad(a, b, c, d):
+    return [(a, b, c), (a, c, d)]
+
+
+CUBE = HEAD.replace("dimension 2", "dimension 3") + """
+boundary f f f
+region box block -0.5 1.5 -0.5 1.5 -0.5 1 units box
+create_box 1 box
+neighbor 0.05 bin
+lattice sc 0.05 origin 0.5 0.5 0.5
+region cube block 0.3 0.7 0.3 0.7 0.05 0.35 units box
+create_atoms 1 region cube
+set group all density 1000 vx 0.3
+fix E all property/global youngsModulus peratomtype 1e6
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix mpm all mpm/couple grid 0.1 shape {shape} transfer flip 0.99 material elastic 3d
+fix g all gravity 9.81 vector 0 0 -1
+timestep 2e-4
+"""
+THERMO = """
+thermo 100
+thermo_style custom step f_mpm[1] f_mpm[2] f_mpm[4] f_mpm[5] f_floor[1] f_floor[3] f_floor[6] f_floor[8]
+thermo_modify format float %.15g
+"""
+FLOOR = stl(*quad((-0.4, -0.4, 0), (1.4, -0.4, 0), (1.4, 1.4, 0), (-0.4, 1.4, 0)))
+MESH = "fix mesh all mesh/surface file floor.stl type 1\n"
+
+
+@pytest.mark.parametrize("shape", ["linear", "gimp", "bspline"])
+def test_a_mesh_of_two_triangles_is_a_plane(shape, dempm):
+    tables = []
+    for wall in ["plane z 0", "mesh mesh", "mesh mesh side +"]:
+        script = CUBE.format(shape=shape) + MESH + f"fix floor all mpm/wall mpm {wall} friction 0.3\n" + THERMO + "run 1500\n"
+        tables.append(dempm(script, files={"floor.stl": FLOOR}).table)
+    assert max(tables[0]["floor[3]"]) > 0.0
+    for table in tables[1:]:
+        for name, values in tables[0].items():
+            assert table[name] == values, name
+
+
+def test_a_moving_mesh_pushes_as_a_moving_plane(dempm):
+    """To half a cell: from there on a surface holds the next layer of nodes, a plane only when it has passed it."""
+    tables = []
+    for wall in ["plane z 0 velocity 0.1 0 0.15", "mesh mesh"]:
+        script = CUBE.format(shape="gimp") + MESH
+        if wall.startswith("mesh"):
+            script += "fix move all move/mesh mesh mesh linear 0.1 0. 0.15\n"
+        script += f"fix floor all mpm/wall mpm {wall} friction 0.3\n" + THERMO + "run 1500\n"
+        tables.append(dempm(script, files={"floor.stl": FLOOR}).table)
+    plane, mesh = tables
+    assert plane["mpm[4]"][-1] > 0.05 * plane["mpm[1]"][0]
+    for name in ["mpm[2]", "mpm[4]", "mpm[5]", "floor[6]", "floor[8]"]:
+        scale = max(map(abs, plane[name]))
+        # the mesh's place is a sum of other roundings than the plane's: 1e-8 of a cell decides about a node
+        assert mesh[name] == pytest.approx(plane[name], abs=1e-6 * scale), name
+
+
+def test_a_rotating_mesh_does_not_depend_on_ranks(dempm, tmp_path):
+    """A plate that turns about its edge throws the cube; its work is counted: energy of the body = work less losses."""
+    script = CUBE.format(shape="gimp") + MESH + """
+fix move all move/mesh mesh mesh rotate origin -0.4 0. 0. axis 0. -1. 0. period 6.
+fix floor all mpm/wall mpm mesh mesh friction 0.3
+""" + THERMO + state_dump(600).replace(" y ", " y z ").replace("%.17g %", "%.17g %", 1).replace('"%g', '"%g %.17g', 1) + "run 600\n"
+    runs = [dempm(script, np=np, files={"floor.stl": FLOOR}, cwd=tmp_path / str(np)) for np in (1, 3)]
+    assert state(runs[0], 600) == state(runs[1], 600)
+    assert runs[0].table["floor[8]"][-1] > 0.0
+
+
+HOPPER = """
+units si
+dimension 3
+atom_style granular
+atom_modify map array
+newton off
+communicate single vel yes
+boundary f f f
+region box block -0.4 0.4 -0.4 0.4 -0.5 0.9 units box
+create_box 1 box
+neighbor 0.05 bin
+timestep 2e-4
+fix kn   all property/global kn peratomtypepair 1 1e4
+fix kt   all property/global kt peratomtypepair 1 1e4
+fix mu   all property/global coefficientFriction peratomtypepair 1 0.5
+fix rve all mpm/rve packing spheres.data model hooke/stiffness tangential history density 2650 grain sphere &
+  damping viscous 0.2
+lattice sc 0.05 origin 0.5 0.5 0.5
+region fill block -0.2 0.2 -0.2 0.2 0.2 0.4 units box
+create_atoms 1 region fill
+fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.95 material rve rve
+fix g all gravity 9.81 vector 0 0 -1
+fix silo all mesh/surface file silo.stl type 1
+fix wall all mpm/wall mpm mesh silo friction 0.3
+thermo 100
+thermo_style custom step f_mpm[4] f_wall[3] f_wall[4]
+dump d all custom 500 points.txt id x y z
+"""
+
+
+def silo(half, outlet, low, shoulder, top):
+    """A square silo with a hopper in the shape of a cut pyramid, normals inside."""
+    ring = lambda r, z: [(-r, -r, z), (r, -r, z), (r, r, z), (-r, r, z)]
+    rings = [ring(outlet, low), ring(half, shoulder), ring(half, top)]
+    faces = []
+    for below, above in zip(rings, rings[1:]):
+        for k in range(4):
+            faces += quad(below[(k + 1) % 4], below[k], above[k], above[(k + 1) % 4])
+    return stl(*faces)
+
+
+def test_grains_leave_a_silo_of_triangles_through_its_outlet_only(dempm, tmp_path):
+    run = dempm(HOPPER, np=1, files={"silo.stl": silo(0.2, 0.1, 0.1, 0.2, 0.8)}, cwd=tmp_path)
+
+
+def test_segments_continue_from_a_restart(dempm, tmp_path):
+    """A moving, inclined, warm segment; 2 N steps equal N, restart and N, on other ranks, too."""
+    tail = """
+neighbor 0.05 bin
+timestep 2e-4
+fix E all property/global youngsModulus peratomtype 1e6
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix c all property/global thermalCapacity peratomtype 10
+fix k all property/global thermalConductivity peratomtype 100
+fix beta all property/global thermalExpansionCoefficient peratomtype 1e-5
+fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.99 material elastic plane_strain point/size 0.05 0.05 &
+  thermal yes temperature 0
+fix g all gravity 9.81 vector 0 -1 0
+fix wall all mpm/wall mpm segment 0.2 0.3 0.9 -0.05 1.8 0.1 friction 0.5 velocity 0 0.1 0 temperature 10
+thermo 100
+thermo_style custom step f_mpm[2] f_mpm[3] f_mpm[5] f_mpm[8] f_wall[1] f_wall[2] f_wall[6] f_wall[7] f_wall[8] f_wall[10]
+thermo_modify format float %.15g
+""" + state_dump(600)
+    first = BOX.format(boundary="f f").replace("box block 0 2 0 2", "box block 0 2 -0.5 2") + POINTS + tail
+    through = dempm(first + "restart 600 half.*\nrun 1200\n", cwd=tmp_path)
+    expected, table = state(through, 1200), through.table
+    assert table["wall[7]"][-1] > 0.0 and table["wall[2]"][-1] > 0.0 and table["wall[10]"][-1] == pytest.approx(0.024)
+    for np in (1, 3):
+        (tmp_path / "state.1200.txt").unlink()
+        again = dempm(HEAD + "read_restart half.600\n" + tail + "run 600\n", np=np, cwd=tmp_path)
+        assert state(again, 1200) == expected
+        for name in table:
+            # sums over ranks come in another order
+            assert again.table[name][-1] == pytest.approx(table[name][-1], rel=1e-12, abs=1e-12), name
