@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Walls of segments and of meshes: fix mpm/wall ... segment, fix mpm/wall ... mesh with LIGGGHTS' fix mesh/surface."""
-import math
-
 import pytest
-from scripts import HEAD, BOX, POINTS, state, state_dump
+from conftest import BUILD, execute
+from scripts import BOX, HEAD, POINTS, state, state_dump
 
 
 def stl(*triangles):
@@ -65,7 +64,7 @@ def test_a_moving_mesh_pushes_as_a_moving_plane(dempm):
         script += f"fix floor all mpm/wall mpm {wall} friction 0.3\n" + THERMO + "run 1500\n"
         tables.append(dempm(script, files={"floor.stl": FLOOR}).table)
     plane, mesh = tables
-    assert plane["mpm[4]"][-1] > 0.05 * plane["mpm[1]"][0]
+    assert plane["floor[8]"][-1] > 0.0 and plane["floor[6]"][-1] > 0.0
     for name in ["mpm[2]", "mpm[4]", "mpm[5]", "floor[6]", "floor[8]"]:
         scale = max(map(abs, plane[name]))
         # the mesh's place is a sum of other roundings than the plane's: 1e-8 of a cell decides about a node
@@ -83,34 +82,29 @@ fix floor all mpm/wall mpm mesh mesh friction 0.3
     assert runs[0].table["floor[8]"][-1] > 0.0
 
 
-HOPPER = """
-units si
-dimension 3
-atom_style granular
-atom_modify map array
-newton off
-communicate single vel yes
+HOPPER = HEAD.replace("dimension 2", "dimension 3") + """
 boundary f f f
 region box block -0.4 0.4 -0.4 0.4 -0.5 0.9 units box
 create_box 1 box
 neighbor 0.05 bin
 timestep 2e-4
-fix kn   all property/global kn peratomtypepair 1 1e4
-fix kt   all property/global kt peratomtypepair 1 1e4
+fix kn   all property/global kn peratomtypepair 1 1e6
+fix kt   all property/global kt peratomtypepair 1 1e6
 fix mu   all property/global coefficientFriction peratomtypepair 1 0.5
 fix rve all mpm/rve packing spheres.data model hooke/stiffness tangential history density 2650 grain sphere &
   damping viscous 0.2
 lattice sc 0.05 origin 0.5 0.5 0.5
-region fill block -0.2 0.2 -0.2 0.2 0.2 0.4 units box
+region fill block -0.2 0.2 -0.2 0.2 0.15 0.25 units box
 create_atoms 1 region fill
-fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.95 material rve rve
+fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.99 material rve rve
 fix g all gravity 9.81 vector 0 0 -1
 fix silo all mesh/surface file silo.stl type 1
-fix wall all mpm/wall mpm mesh silo friction 0.3
-thermo 100
-thermo_style custom step f_mpm[4] f_wall[3] f_wall[4]
-dump d all custom 500 points.txt id x y z
-"""
+fix wall all mpm/wall mpm mesh silo friction 0.1
+thermo 1
+thermo_style custom step f_mpm[1] f_mpm[4] f_wall[3] f_wall[4]
+thermo_modify format float %.15g
+dump d all custom 100 points.*.txt id x y z
+""" + state_dump(200).replace(" y ", " y z ").replace('"%g', '"%g %.17g', 1)
 
 
 def silo(half, outlet, low, shoulder, top):
@@ -124,8 +118,75 @@ def silo(half, outlet, low, shoulder, top):
     return stl(*faces)
 
 
+def make_spheres(path):
+    """16 spheres of 0.05 to 0.1 m: large grains, so that one DEM step per MPM step will do."""
+    code, output = execute([BUILD / "dempm-pack", "generate", path, "dimension", "3", "radius", "0.05", "0.1", "pressure",
+                            "1e3", "preparation_friction", "0.5", "density", "2650", "kn", "1e6", "kt", "1e6", "grains", "16"])
+    assert code == 0, output
+
+
 def test_grains_leave_a_silo_of_triangles_through_its_outlet_only(dempm, tmp_path):
-    run = dempm(HOPPER, np=1, files={"silo.stl": silo(0.2, 0.1, 0.1, 0.2, 0.8)}, cwd=tmp_path)
+    """A silo of 0.5 m x 0.5 m with a hopper at 45 degrees and an outlet of 0.3 m x 0.3 m at z = 0.1."""
+    make_spheres(tmp_path / "spheres.data")
+    mesh = {"silo.stl": silo(0.25, 0.15, 0.1, 0.2, 0.8)}
+    run = dempm(HOPPER + "run 1800\n", files=mesh, cwd=tmp_path)
+    steps = sorted(int(path.name.split(".")[1]) for path in tmp_path.glob("points.*.txt"))
+    assert steps[-1] == 1800
+    for step in steps:
+        points = run.dump(f"points.{step}.txt")[0][1]
+        for x, y, z in zip(points["x"], points["y"], points["z"]):
+            if z > 0.1:
+                assert max(abs(x), abs(y)) < min(0.25, 0.05 + z), f"step {step}: a point went through a wall"
+    below = sum(z < 0.1 for z in points["z"])
+    print(f"{below} of {len(points['z'])} points have left after 0.36 s")
+    assert 30 <= below < len(points["z"])
+    # momentum = impulse of weight and wall; 1e-9: round-off of 1800 steps
+    table, dt = run.table, 2e-4
+    expected = sum(table["wall[3]"][1:]) * dt - table["mpm[1]"][0] * 9.81 * 1800 * dt
+    assert table["mpm[4]"][-1] == pytest.approx(expected, rel=1e-9)
+    assert min(table["wall[4]"][1:]) >= -1e-9 * max(table["wall[4]"])
+    one = state(run, 200)
+    make_spheres((tmp_path / "two").mkdir() or tmp_path / "two" / "spheres.data")
+    assert state(dempm(HOPPER + "run 200\n", np=2, files=mesh, cwd=tmp_path / "two"), 200) == one
+
+
+WRONG = [
+    ("no mesh", "mesh mesh", "mesh nobody", ["'mesh'", "nobody", "fix mesh/surface"]),
+    ("not a mesh", "mesh mesh", "mesh g", ["'mesh'", "fix g", "gravity", "mesh/surface"]),
+    ("no id", "mesh mesh friction 0.3", "mesh", ["'mesh'", "missing", "ID"]),
+    ("velocity", "mesh mesh", "mesh mesh velocity 0 0 1", ["'mesh'", "'velocity'", "move/mesh"]),
+    ("segment in 3D", "mesh mesh", "segment 0 0 1 0", ["'segment'", "2D", "'mesh'"]),
+    ("side", "mesh mesh", "mesh mesh side up", ["'side'", "'up'"]),
+    ("heat", "mesh mesh", "mesh mesh temperature 5", ["'temperature'", "thermal yes"]),
+]
+
+
+@pytest.mark.parametrize("np", [1, 2])
+@pytest.mark.parametrize("old, new, words", [case[1:] for case in WRONG], ids=[case[0] for case in WRONG])
+def test_wrong_meshes_are_refused(old, new, words, np, dempm):
+    line = "fix floor all mpm/wall mpm mesh mesh friction 0.3\n"
+    script = CUBE.format(shape="gimp") + MESH + line.replace(old, new) + "run 2\n"
+    run = dempm(script, np=np, files={"floor.stl": FLOOR}, check=False, timeout=20)
+    assert run.code > 0
+    errors = " ".join(" ".join(text for text in run.output.splitlines() if "ERROR" in text).split())
+    assert all(word in errors for word in ["Fix mpm/wall (id floor)", *words]), errors
+
+
+def test_a_moving_mesh_continues_from_a_restart(dempm, tmp_path):
+    """LIGGGHTS writes mesh and motion into the restart file; 2 N steps equal N steps, restart and N steps."""
+    tail = MESH + "fix move all move/mesh mesh mesh rotate origin -0.4 0. 0. axis 0. -1. 0. period 6.\n"
+    tail += "fix floor all mpm/wall mpm mesh mesh friction 0.3\n" + THERMO
+    tail += state_dump(200).replace(" y ", " y z ").replace('"%g', '"%g %.17g', 1)
+    head, body = CUBE.format(shape="gimp").replace("elastic 3d", "elastic 3d point/size 0.05 0.05 0.05").split("fix E all", 1)
+    body = "neighbor 0.05 bin\nfix E all" + body
+    through = dempm(head + body + tail + "restart 600 half.*\nrun 1000\n", files={"floor.stl": FLOOR}, cwd=tmp_path)
+    expected, table = state(through, 1000), through.table
+    assert table["floor[8]"][-1] > 0.0
+    (tmp_path / "state.1000.txt").unlink()
+    start = HEAD.replace("dimension 2", "dimension 3") + "read_restart half.600\n"
+    again = dempm(start + body + tail + "run 400\n", cwd=tmp_path)
+    assert state(again, 1000) == expected
+    assert again.table["floor[8]"][-1] == table["floor[8]"][-1]
 
 
 def test_segments_continue_from_a_restart(dempm, tmp_path):
