@@ -73,7 +73,7 @@ def report(case):
         if pick:
             print(f"  mean temperature {name}: {np.mean(pick):.5f} K ({len(pick)} points)")
     print(f"  grain friction {change('mpm[9]'):.1f} J/m, grain damping {change('mpm[13]'):.1f} J/m, wall friction "
-          f"{change('left[6]') + change('right[6]') + change('ground[6]'):.1f} J/m (without the plate's), "
+          f"{change('left[6]') + change('right[6]') + change('floor[6]'):.1f} J/m (without the plate's), "
           f"potential energy {change('mpm[6]'):.1f} J/m")
     print(f"  points that went through a wall: {max(leaks(points) for _, points in series)}")
     return left, table["hottest"]

@@ -218,3 +218,26 @@ thermo_modify format float %.15g
         for name in table:
             # sums over ranks come in another order
             assert again.table[name][-1] == pytest.approx(table[name][-1], rel=1e-12, abs=1e-12), name
+
+
+@pytest.mark.parametrize("boundary", ["f f", "p f"])
+def test_a_level_segment_is_a_plane_on_any_number_of_ranks(boundary, dempm, tmp_path):
+    """Also across a periodic boundary, where the segment repeats with the box: the block slides through it."""
+    script = BOX.format(boundary=boundary) + POINTS.replace("vx 0.5", "vx 4" if boundary == "p f" else "vx 0.5") + """
+neighbor 0.05 bin
+timestep 2e-4
+fix E all property/global youngsModulus peratomtype 1e6
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.99 material elastic plane_strain
+fix g all gravity 9.81 vector 0 -1 0
+fix floor all mpm/wall mpm {wall} friction 0.2
+thermo 100
+thermo_style custom step f_mpm[2] f_mpm[3] f_floor[2] f_floor[6]
+thermo_modify format float %.15g
+""" + state_dump(1500).replace("{", "{{").replace("}", "}}") + "run 1500\n"
+    states = []
+    for k, (wall, np) in enumerate([("plane y 0", 1), ("segment 0 0 0.73 0 2 0", 1), ("segment 0 0 0.73 0 2 0", 2)]):
+        run = dempm(script.format(wall=wall), np=np, cwd=tmp_path / str(k))
+        assert run.table["floor[6]"][-1] > 0.0
+        states.append(state(run, 1500))
+    assert states[0] == states[1] == states[2]
