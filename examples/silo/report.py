@@ -7,7 +7,7 @@ import pathlib
 import numpy as np
 
 OUT = pathlib.Path(__file__).resolve().parent / "out"
-OUTLET, SHOULDER, EDGE = 1.0, 1.4, 0.4  # m: height of the outlet, of the hopper's upper end; end of the left hopper wall
+OUTLET, SHOULDER, EDGE = 1.0, 1.4, 0.4  # m: heights of outlet and hopper's top; end of its left wall
 
 
 def thermo(log):
@@ -61,8 +61,8 @@ def report(case):
           f"million particle-steps, {seconds:.0f} s wall, {steps / max(seconds, 1e-9) / 1e6:.1f} million per second")
     for moment in np.linspace(0.0, time[-1], 7)[1:]:
         k = int(np.argmin(abs(time - moment)))
-        print(f"  t = {time[k]:.2f} s: {100 * left[k]:5.1f} % of the mass above the outlet ({mass * left[k]:.1f} kg/m), "
-              f"hottest point {table['hottest'][k]:.5f} K")
+        print(f"  t = {time[k]:.2f} s: {100 * left[k]:5.1f} % of the mass above the outlet "
+              f"({mass * left[k]:.1f} kg/m), hottest point {table['hottest'][k]:.5f} K")
     last = series[-1][1]
     hottest = last[np.argsort(-last[:, 5])]
     print("  hottest points: " + ", ".join(f"({x:.2f}, {y:.2f}) {t:.5f} K {place(x, y)}"
@@ -76,8 +76,6 @@ def report(case):
           f"{change('left[6]') + change('right[6]') + change('floor[6]'):.1f} J/m (without the plate's), "
           f"potential energy {change('mpm[6]'):.1f} J/m")
     print(f"  points that went through a wall: {max(leaks(points) for _, points in series)}")
-    return left, table["hottest"]
-
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--size", default="demo")

@@ -38,8 +38,8 @@ FixMPMWall::FixMPMWall(LAMMPS *lammps, int narg, char **arg)
   wall_.contact = MPM_WALL_SLIP;
 
   KeywordParser parser(lmp, this, narg, arg, 4,
-                       {"plane", "box", "segment", "mesh", "noslip", "slip", "friction", "nocontact", "glued", "temperature", "flux",
-                        "velocity", "side", "within"});
+                       {"plane", "box", "segment", "mesh", "noslip", "slip", "friction", "nocontact", "glued",
+                        "temperature", "flux", "velocity", "side", "within"});
   while (parser.next()) {
     if (parser.is("plane") || parser.is("box") || parser.is("segment") || parser.is("mesh")) read_shape(parser);
     else if (parser.is("noslip")) wall_.contact = MPM_WALL_NO_SLIP;
@@ -174,7 +174,8 @@ struct MeshTriangle {
  * in the order of the triangles' ids. dt > 0: where a moving mesh was dt earlier. Collective. */
 std::vector<MpmFacet> FixMPMWall::gather_mesh(double dt) {
   TriMesh *mesh = mesh_->triMesh();
-  MultiVectorContainer<double, 3, 3> *velocity = mesh->prop().getElementProperty<MultiVectorContainer<double, 3, 3> >("v");
+  typedef MultiVectorContainer<double, 3, 3> NodeVectors;
+  NodeVectors *velocity = mesh->prop().getElementProperty<NodeVectors>("v");
   std::vector<MeshTriangle> own(mesh->sizeLocal());
   for (size_t k = 0; k < own.size(); k++) {
     own[k].id = mesh->id((int)k);

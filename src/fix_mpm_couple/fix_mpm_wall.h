@@ -20,16 +20,17 @@ namespace LAMMPS_NS {
 
 /* A wall for the material points of a fix mpm/couple; removed by `unfix`. The group is not used.
  *
- *   fix ID group mpm/wall MPMFIXID plane x|y|z POS | box x0 x1 y0 y1 [z0 z1] | segment x0 y0 x1 y1 [x2 y2 ...] | mesh ID
+ *   fix ID group mpm/wall MPMFIXID plane x|y|z POS | box x0 x1 y0 y1 [z0 z1] | segment x0 y0 x1 y1 [x2 y2 ...] |
+ *       mesh MESHFIXID
  *       [noslip | slip | friction MU | nocontact] [glued] [temperature T | flux Q] [velocity vx vy vz] [side +|-]
  *       [within x0 x1 y0 y1 [z0 z1]]
  *
  * A plane holds the points on one side, which is that of all points when a run starts unless `side` names it; a box
- * holds them outside. A segment (2D; a chain of them if there are more corners) and a mesh (3D; a fix mesh/surface of
- * LIGGGHTS, which `fix move/mesh` may move) are thin and hold points on both sides, or as a plane on one `side`: the left
- * of the way from the first to the last corner, the front of the triangles. Default contact: slip (frictionless, the points may lift off unless `glued`). `nocontact`: heat
- * only. `flux`: W/m2 into the body. `within` limits the wall to grid nodes inside a box (INF: no limit) that does not
- * move with the wall.
+ * holds them outside. A chain of segments (2D) and a mesh (3D; a fix mesh/surface of LIGGGHTS, which `fix move/mesh`
+ * may move) are thin and hold points on both sides, or as a plane on one `side`: the left of the way from the first to
+ * the last corner, the front of the triangles. Default contact: slip (frictionless, the points may lift off unless
+ * `glued`). `nocontact`: heat only. `flux`: W/m2 into the body. `within` limits the wall to grid nodes inside a box
+ * (INF: no limit) that does not move with the wall.
  *
  * Global vector; in 2D forces, powers and energies are per metre of depth:
  *   1-3   force of the wall on the body in the last step, N

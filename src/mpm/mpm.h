@@ -73,7 +73,7 @@ void mpm_point_default(MpmPoint *point); /* F = I, all else 0 */
 /* Walls. A plane keeps the half space its normal points into; a box keeps its outside. Both may move at `velocity`. A
  * surface is a thin wall of facets, each moving as its corners do; it may hold material on either side. */
 typedef enum MpmWallKind { MPM_WALL_PLANE, MPM_WALL_BOX, MPM_WALL_SURFACE } MpmWallKind;
-/* 2D: the segment from node[0] to node[1], its normal to the left; 3D: a triangle, its normal by the right-hand rule. */
+/* 2D: a segment from node[0] to node[1], its normal to the left; 3D: a triangle, its normal by the right-hand rule. */
 typedef struct MpmFacet {
   double node[3][3];     /* m */
   double velocity[3][3]; /* m/s, of the nodes */

@@ -23,8 +23,9 @@ static BaseStatus turn_one(MpmFacet *facet, int dimension, int index, int count)
   for (int n = 0; n < dimension; n++)
     for (int i = 0; i < 3; i++)
       if (!isfinite(facet->node[n][i]) || !isfinite(facet->velocity[n][i]))
-        return base_error(BASE_ERROR_ARGUMENT, "facet %d of %d: node %d is at %g with velocity %g (axis %d); both must be "
-                          "finite", index + 1, count, n + 1, facet->node[n][i], facet->velocity[n][i], i);
+        return base_error(BASE_ERROR_ARGUMENT,
+                          "facet %d of %d: node %d is at %g with velocity %g (axis %d); both must be finite", index + 1,
+                          count, n + 1, facet->node[n][i], facet->velocity[n][i], i);
   subtract(facet->node[1], facet->node[0], first);
   if (dimension == 3) {
     subtract(facet->node[2], facet->node[0], second);

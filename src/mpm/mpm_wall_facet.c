@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Surfaces: which nodes they hold, and which points are near them.
  *
- * A surface is thin, and the grid has one velocity per node. So the points near a surface are told apart first: in front
- * of it or behind it, by the facet nearest to them; points whose nearest is the rim (the outlet edge of a hopper) belong
- * to neither. A node receives mass from points in front, from points behind, or from both. For each side that it has
+ * A surface is thin, and the grid has one velocity per node. So the points near a surface are told apart first: in
+ * front of it or behind it, by the facet nearest to them; points whose nearest is the rim (the outlet edge of a hopper)
+ * belong to neither. A node receives mass from points in front, from points behind, or from both. For each side that it has
  * mass of, it is held as by a plane if
  *   - it projects into a facet and is closer to it than half a cell, or
  *   - it lies further behind the surface, seen from that side, and most of the mass of both sides is of that side.
@@ -21,7 +21,7 @@
 
 static const double ROUND_OFF = 1e-8; /* of the spacing */
 static const double BAND = 0.5;       /* of the spacing */
-static const double LEAST_SHARE = 0.01; /* of a node's mass near the surface: less does not make it a node of that side */
+static const double LEAST_SHARE = 0.01; /* of a node's mass near the surface: less does not hold it for that side */
 static const double NEAR = 1.5;       /* of the spacing: points in reach of flux and guard */
 
 typedef struct MpmNearest {
@@ -39,13 +39,13 @@ typedef struct MpmCandidate {
 /* Half the width of the neighbourhood of a surface: nodes in the band and all points that may give them mass. */
 static double reach_of(const MpmScene *scene) { return scene->spacing * (BAND + 1.5 * sqrt(scene->dimension)); }
 
-/* --------------------------------------------------------------------- cells and nodes in a box, by their sorted keys */
+/* -------------------------------------------------------------------- cells and nodes in a box, by their sorted keys */
 
 typedef struct Sweep {
   const uint64_t *key;
   int count, low[3], high[3];
-  int row[2];   /* y, z */
-  int at;       /* next index in this row; -1: row to be found */
+  int row[2]; /* y, z */
+  int at;     /* next index in this row; -1: row to be found */
 } Sweep;
 
 static uint64_t pack(int x, int y, int z, int dimension) {
@@ -105,7 +105,7 @@ static void find_bounds(const MpmGrid *grid, int bounds[2][3]) {
     }
 }
 
-/* ------------------------------------------------------------------------------------------------------------ points */
+/* ----------------------------------------------------------------------------------------------------------- points */
 
 /* The nearest facet of each point; among facets equally near, which share an edge, the one that sees the point most
  * from above: its sign is the right one. */
@@ -187,7 +187,7 @@ static BaseStatus sort_points_by_side(Mpm *mpm, int w) {
   return BASE_OK;
 }
 
-/* ------------------------------------------------------------------------------------------------------------- nodes */
+/* ------------------------------------------------------------------------------------------------------------ nodes */
 
 static BaseStatus meet_nodes(Mpm *mpm, const MpmWall *wall, const MpmFacet *facet, int order, int bounds[2][3]) {
   const MpmScene *scene = &mpm->scene;
@@ -288,7 +288,8 @@ static BaseStatus hold_nodes(Mpm *mpm, int w) {
   if (scratch->candidates == 0) return BASE_OK;
   qsort(scratch->candidate, (size_t)scratch->candidates, sizeof *scratch->candidate, compare_candidates);
   for (int first = 0, end; first < scratch->candidates; first = end) {
-    for (end = first; end < scratch->candidates && scratch->candidate[end].node == scratch->candidate[first].node;) end++;
+    const int node = scratch->candidate[first].node;
+    for (end = first; end < scratch->candidates && scratch->candidate[end].node == node;) end++;
     for (int side = 0; side < 2; side++)
       TRY(hold_node(mpm, w, scratch->candidate + first, end - first, side));
   }
@@ -312,7 +313,9 @@ static BaseStatus reserve(Mpm *mpm) {
   return BASE_OK;
 }
 
-/* The facet's image number `image` of 27: a surface repeats with a periodic scene. 0 if there is none. */
+enum { IMAGES = 27 };
+
+/* The facet's image number `image`, 0: itself. A surface repeats with a periodic scene. Returns 0 if there is none. */
 static int shift(const MpmScene *scene, int image, MpmFacet *facet) {
   for (int i = 0, rest = image; i < 3; i++, rest /= 3) {
     const int step = (rest + 1) % 3 - 1; /* 0, 1, -1 */
@@ -325,12 +328,13 @@ static int shift(const MpmScene *scene, int image, MpmFacet *facet) {
 
 BaseStatus mpm_surface_find(Mpm *mpm, int w) {
   const MpmWall *wall = &mpm->walls[w];
+  const int *periodic = mpm->scene.periodic, images = periodic[0] || periodic[1] || periodic[2] ? IMAGES : 1;
   TRY(reserve(mpm));
   int bounds[2][3];
   find_bounds(&mpm->grid, bounds);
   for (int k = 0; k < mpm->points.count; k++) mpm->wall_scratch.nearest[k].at = (MpmFacetNearest){.distance = INFINITY};
   for (int f = 0; f < wall->facet_count; f++)
-    for (int image = 0; image < 27; image++) {
+    for (int image = 0; image < images; image++) {
       MpmFacet facet = wall->facets[f];
       if (shift(&mpm->scene, image, &facet)) meet_points(mpm, &facet, bounds);
     }
@@ -338,9 +342,9 @@ BaseStatus mpm_surface_find(Mpm *mpm, int w) {
   mpm->wall_scratch.candidates = 0;
   if (wall->contact == MPM_WALL_NO_CONTACT && wall->heat != MPM_WALL_TEMPERATURE) return BASE_OK;
   for (int f = 0; f < wall->facet_count; f++)
-    for (int image = 0; image < 27; image++) {
+    for (int image = 0; image < images; image++) {
       MpmFacet facet = wall->facets[f];
-      if (shift(&mpm->scene, image, &facet)) TRY(meet_nodes(mpm, wall, &facet, 27 * f + image, bounds));
+      if (shift(&mpm->scene, image, &facet)) TRY(meet_nodes(mpm, wall, &facet, IMAGES * f + image, bounds));
     }
   return hold_nodes(mpm, w);
 }

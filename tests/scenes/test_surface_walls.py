@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Walls of segments and of meshes: fix mpm/wall ... segment, fix mpm/wall ... mesh with LIGGGHTS' fix mesh/surface."""
+import shutil
+
 import pytest
-from conftest import BUILD, execute
+from conftest import BUILD, ROOT, execute
 from scripts import BOX, HEAD, POINTS, state, state_dump
 
 
@@ -16,6 +18,10 @@ def stl(*triangles):
 
 def quad(a, b, c, d):
     return [(a, b, c), (a, c, d)]
+
+
+def state_dump_3d(every):
+    return state_dump(every).replace(" y ", " y z ").replace('"%g', '"%g %.17g', 1)
 
 
 CUBE = HEAD.replace("dimension 2", "dimension 3") + """
@@ -46,7 +52,8 @@ MESH = "fix mesh all mesh/surface file floor.stl type 1\n"
 def test_a_mesh_of_two_triangles_is_a_plane(shape, dempm):
     tables = []
     for wall in ["plane z 0", "mesh mesh", "mesh mesh side +"]:
-        script = CUBE.format(shape=shape) + MESH + f"fix floor all mpm/wall mpm {wall} friction 0.3\n" + THERMO + "run 1500\n"
+        script = CUBE.format(shape=shape) + MESH + f"fix floor all mpm/wall mpm {wall} friction 0.3\n" + THERMO
+        script += "run 1500\n"
         tables.append(dempm(script, files={"floor.stl": FLOOR}).table)
     assert max(tables[0]["floor[3]"]) > 0.0
     for table in tables[1:]:
@@ -76,7 +83,7 @@ def test_a_rotating_mesh_does_not_depend_on_ranks(dempm, tmp_path):
     script = CUBE.format(shape="gimp") + MESH + """
 fix move all move/mesh mesh mesh rotate origin -0.4 0. 0. axis 0. -1. 0. period 6.
 fix floor all mpm/wall mpm mesh mesh friction 0.3
-""" + THERMO + state_dump(600).replace(" y ", " y z ").replace("%.17g %", "%.17g %", 1).replace('"%g', '"%g %.17g', 1) + "run 600\n"
+""" + THERMO + state_dump_3d(600) + "run 600\n"
     runs = [dempm(script, np=np, files={"floor.stl": FLOOR}, cwd=tmp_path / str(np)) for np in (1, 3)]
     assert state(runs[0], 600) == state(runs[1], 600)
     assert runs[0].table["floor[8]"][-1] > 0.0
@@ -104,7 +111,7 @@ thermo 1
 thermo_style custom step f_mpm[1] f_mpm[4] f_wall[3] f_wall[4]
 thermo_modify format float %.15g
 dump d all custom 100 points.*.txt id x y z
-""" + state_dump(200).replace(" y ", " y z ").replace('"%g', '"%g %.17g', 1)
+""" + state_dump_3d(200)
 
 
 def silo(half, outlet, low, shoulder, top):
@@ -120,8 +127,8 @@ def silo(half, outlet, low, shoulder, top):
 
 def make_spheres(path):
     """16 spheres of 0.05 to 0.1 m: large grains, so that one DEM step per MPM step will do."""
-    code, output = execute([BUILD / "dempm-pack", "generate", path, "dimension", "3", "radius", "0.05", "0.1", "pressure",
-                            "1e3", "preparation_friction", "0.5", "density", "2650", "kn", "1e6", "kt", "1e6", "grains", "16"])
+    words = f"{BUILD}/dempm-pack generate {path} dimension 3 radius 0.05 0.1 pressure 1e3 preparation_friction 0.5"
+    code, output = execute(words.split() + "density 2650 kn 1e6 kt 1e6 grains 16".split())
     assert code == 0, output
 
 
@@ -176,8 +183,9 @@ def test_a_moving_mesh_continues_from_a_restart(dempm, tmp_path):
     """LIGGGHTS writes mesh and motion into the restart file; 2 N steps equal N steps, restart and N steps."""
     tail = MESH + "fix move all move/mesh mesh mesh rotate origin -0.4 0. 0. axis 0. -1. 0. period 6.\n"
     tail += "fix floor all mpm/wall mpm mesh mesh friction 0.3\n" + THERMO
-    tail += state_dump(200).replace(" y ", " y z ").replace('"%g', '"%g %.17g', 1)
-    head, body = CUBE.format(shape="gimp").replace("elastic 3d", "elastic 3d point/size 0.05 0.05 0.05").split("fix E all", 1)
+    tail += state_dump_3d(200)
+    script = CUBE.format(shape="gimp").replace("elastic 3d", "elastic 3d point/size 0.05 0.05 0.05")
+    head, body = script.split("fix E all", 1)
     body = "neighbor 0.05 bin\nfix E all" + body
     through = dempm(head + body + tail + "restart 600 half.*\nrun 1000\n", files={"floor.stl": FLOOR}, cwd=tmp_path)
     expected, table = state(through, 1000), through.table
@@ -204,7 +212,8 @@ fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.99 material elastic p
 fix g all gravity 9.81 vector 0 -1 0
 fix wall all mpm/wall mpm segment 0.2 0.3 0.9 -0.05 1.8 0.1 friction 0.5 velocity 0 0.1 0 temperature 10
 thermo 100
-thermo_style custom step f_mpm[2] f_mpm[3] f_mpm[5] f_mpm[8] f_wall[1] f_wall[2] f_wall[6] f_wall[7] f_wall[8] f_wall[10]
+thermo_style custom step f_mpm[2] f_mpm[3] f_mpm[5] f_mpm[8] f_wall[1] f_wall[2] f_wall[6] f_wall[7] f_wall[8] &
+  f_wall[10]
 thermo_modify format float %.15g
 """ + state_dump(600)
     first = BOX.format(boundary="f f").replace("box block 0 2 0 2", "box block 0 2 -0.5 2") + POINTS + tail
@@ -241,3 +250,25 @@ thermo_modify format float %.15g
         assert run.table["floor[6]"][-1] > 0.0
         states.append(state(run, 1500))
     assert states[0] == states[1] == states[2]
+
+
+@pytest.mark.parametrize("size, points", [("demo", 544), ("paper", 1088)])
+def test_the_silo_example_runs(size, points, dempm, tmp_path):
+    """examples/silo with 16 grains and a few steps: both sizes, both cases; the plate does work, nothing leaks."""
+    for file in (ROOT / "examples" / "silo").glob("*.inc"):
+        shutil.copy(file, tmp_path)
+    (tmp_path / "out").mkdir()
+    words = f"{BUILD}/dempm-pack generate {tmp_path}/out/packing.data radius 0.0025 0.005 pressure 1e4"
+    words += " preparation_friction 0.5 density 2650 kn 1e6 kt 1e6 thickness 0.075 grains 16"
+    code, output = execute(words.split())
+    assert code == 0, output
+    example = ROOT / "examples" / "silo"
+    dempm(example / "in.settle", cwd=tmp_path, variables={"size": size, "t_settle": 0.002})
+    heat = {}
+    for case in ("free", "forced"):
+        variables = {"size": size, "case": case, f"t_{case}": 0.02}
+        table = dempm(example / "in.discharge", cwd=tmp_path, variables=variables).table
+        assert table["mpm[1]"][0] == pytest.approx(points * 0.025**2 * 2650 * 0.8, rel=0.1)  # 20 % of voids
+        assert table["above"][-1] == 1.0
+        heat[case] = table["mpm[9]"][-1]
+    assert heat["forced"] > 2 * heat["free"] > 0.0
