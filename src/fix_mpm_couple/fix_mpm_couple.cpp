@@ -354,7 +354,7 @@ void FixMPMCouple::find_walls_and_tractions() {
     if (wall && wall->mpm_id() == id) {
       wall->begin_run(scene_.thermal, low, high);
       wall_fixes_.push_back(wall);
-      walls_.push_back(wall->present());
+      walls_.push_back(wall->present(0.0));
     }
     const FixMPMTraction *traction = dynamic_cast<FixMPMTraction *>(modify->fix[k]);
     if (traction && traction->mpm_id() == id) tractions.push_back(traction->traction());

@@ -176,7 +176,7 @@ void FixMPMCouple::scatter() {
 
 void FixMPMCouple::final_integrate() {
   gather();
-  for (size_t k = 0; k < walls_.size(); k++) walls_[k] = wall_fixes_[k]->present();
+  for (size_t k = 0; k < walls_.size(); k++) walls_[k] = wall_fixes_[k]->present(update->dt);
   follow_walls();
   fix_check(lmp, this, mpm_step(mpm_, points_.data(), (int)points_.size(), update->dt));
   scatter();

@@ -70,15 +70,33 @@ typedef struct MpmPoint {
 } MpmPoint;
 void mpm_point_default(MpmPoint *point); /* F = I, all else 0 */
 
-/* Walls. A plane keeps the half space its normal points into; a box keeps its outside. Both may move at `velocity`. */
-typedef enum MpmWallKind { MPM_WALL_PLANE, MPM_WALL_BOX } MpmWallKind;
+/* Walls. A plane keeps the half space its normal points into; a box keeps its outside. Both may move at `velocity`. A
+ * surface is a thin wall of facets, each moving as its corners do; it may hold material on either side. */
+typedef enum MpmWallKind { MPM_WALL_PLANE, MPM_WALL_BOX, MPM_WALL_SURFACE } MpmWallKind;
+/* 2D: a segment from node[0] to node[1], its normal to the left; 3D: a triangle, its normal by the right-hand rule. */
+typedef struct MpmFacet {
+  double node[3][3];     /* m */
+  double velocity[3][3]; /* m/s, of the nodes */
+  double normal[3];      /* unit; set by mpm_facets_prepare */
+  /* Bit i: node i, or the edge from node i to the next, is on the rim of the surface; set by mpm_facets_prepare. */
+  unsigned char free_nodes, free_edges;
+} MpmFacet;
+enum { MPM_SIDE_FRONT = 1 /* where the normals point */, MPM_SIDE_BACK = 2 };
+/* Normals, and which nodes and edges are on the rim: those that no other facet shares. 2D: nodes' z must be 0. Once per
+ * surface; while it moves mpm_facets_turn renews the normals. */
+BaseStatus mpm_facets_prepare(MpmFacet *facets, int count, int dimension);
+BaseStatus mpm_facets_turn(MpmFacet *facets, int count, int dimension);
 typedef enum MpmWallContact { MPM_WALL_NO_CONTACT, MPM_WALL_NO_SLIP, MPM_WALL_SLIP, MPM_WALL_FRICTION } MpmWallContact;
 typedef enum MpmWallHeat { MPM_WALL_ADIABATIC, MPM_WALL_TEMPERATURE, MPM_WALL_FLUX } MpmWallHeat;
 typedef struct MpmWall {
   MpmWallKind kind;
   double point[3], normal[3];  /* plane: a point of it, unit normal towards the material */
   double low[3], high[3];      /* box */
-  double velocity[3];          /* m/s, of the wall; the caller moves point / low / high */
+  const MpmFacet *facets;      /* surface, borrowed; the same ones in the same order on all ranks */
+  int facet_count;
+  int sides;                   /* surface: MPM_SIDE_*, where material may be; default both. One side: as a plane, the
+                                * surface holds all points near it, also those that are behind it */
+  double velocity[3];          /* m/s, of a plane or box; the caller moves point / low / high */
   MpmWallContact contact;
   int separable;               /* SLIP, FRICTION: 1 = the body may lift off (default), 0 = glued normally */
   double friction;             /* Coulomb coefficient, FRICTION */
@@ -89,6 +107,7 @@ typedef struct MpmWall {
   /* out, per step, sums over nodes this rank owns: */
   double reaction[3];          /* force of the wall on the body, N */
   double power_friction;       /* W dissipated by wall friction (not heat of the body unless asked) */
+  double power_motion;         /* W, work of the moving wall on the body */
   double heat_flow;            /* W into the body */
 } MpmWall;
 MpmWall mpm_wall_default(void);

@@ -119,9 +119,29 @@ typedef struct MpmContact {
   int node, wall;
   int is_first;     /* of its node */
   double normal[3]; /* into the body */
+  double velocity[3]; /* m/s, of the wall here */
   double start[3];  /* m/s, change of the nodal velocity before the update */
   double change[3]; /* m/s, change of the nodal velocity by this wall's impulse in the update */
 } MpmContact;
+
+/* An own point next to a surface, as it was when the step began. */
+typedef struct MpmNear {
+  int row, wall;
+  double distance;    /* m, from the surface; < 0: behind a surface of one side */
+  double normal[3];   /* towards the point's side */
+  double velocity[3]; /* m/s, of the wall here */
+  double place[3];    /* m, the point */
+} MpmNear;
+
+/* Memory of mpm_wall_facet.c. */
+typedef struct MpmWallScratch {
+  struct MpmNearest *nearest; /* rows */
+  double (*side_mass)[2];     /* nodes: kg of points in front of and behind the surface */
+  struct MpmCandidate *candidate;
+  int nearest_room, node_room, candidates, candidate_room;
+  MpmNear *near;
+  int nears, near_room;
+} MpmWallScratch;
 
 struct Mpm {
   MpmScene scene;
@@ -140,6 +160,7 @@ struct Mpm {
   MpmContact *contacts;
   int contact_count, contact_room;
   int has_corners; /* some node is under several walls */
+  MpmWallScratch wall_scratch;
   int state_is_new; /* state holds the updated velocity and temperature */
   /* The first local error of a step; kept to its end because the callbacks are collective. */
   BaseStatus status;
@@ -157,6 +178,10 @@ struct Mpm {
 
 enum { MPM_PARALLEL_POINTS = 2000 /* fewer: threads cost more than they bring */ };
 
+static inline double mpm_largest_spacing(const Mpm *mpm) {
+  const double h = mpm->spacing[0] > mpm->spacing[1] ? mpm->spacing[0] : mpm->spacing[1];
+  return h > mpm->spacing[2] ? h : mpm->spacing[2];
+}
 static inline int mpm_width(const Mpm *mpm) { return mpm_shape_width(mpm->scene.shape); }
 static inline int mpm_load_width(const Mpm *mpm) { return 1 + mpm->scene.dimension; }
 
@@ -242,11 +267,21 @@ void mpm_heat_walls(Mpm *mpm, MpmVec *load); /* flux walls: heat of the outermos
 BaseStatus mpm_wall_find(Mpm *mpm);       /* contacts: the nodes under each wall; zeroes the walls' outputs */
 void mpm_wall_start(Mpm *mpm);            /* kinematic condition on the nodal velocity before the update */
 void mpm_wall_update(Mpm *mpm);           /* impulses on the updated velocity; the walls' outputs */
+void mpm_wall_guard(Mpm *mpm); /* points that would come too close to a surface are held */
+void mpm_wall_free(Mpm *mpm);
+BaseStatus mpm_wall_add(Mpm *mpm, int node, int wall, const double normal[3], const double velocity[3]);
+
+/* mpm_wall_shape.c: planes and boxes */
+int mpm_wall_is_under(const Mpm *mpm, const MpmWall *wall, int node, double normal[3]);
 double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], double normal[3]);
-int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]);
+int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3], double tolerance);
+void mpm_node_place(const Mpm *mpm, int node, double x[3]);
 /* The face of the point's domain, deformed by f, that looks most along the normal: area vector, m2, and its projection
  * on the normal. */
 double mpm_face_area(const MpmPoint *point, const double f[9], const double normal[3], double area[3]);
+
+/* mpm_wall_facet.c: surfaces */
+BaseStatus mpm_surface_find(Mpm *mpm, int wall);
 
 /* mpm_traction.c */
 void mpm_traction_add(Mpm *mpm, MpmVec *load);

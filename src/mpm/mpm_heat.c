@@ -30,24 +30,33 @@ void mpm_heat_update(Mpm *mpm) {
   }
 }
 
+static void add_flux(Mpm *mpm, MpmWall *wall, int row, double distance, const double normal[3], MpmVec *load) {
+  double vector[3], f[9];
+  mpm_row_deformation(mpm, row, f);
+  const double area = mpm_face_area(&mpm->points.home[mpm->points.slot[row]], f, normal, vector);
+  if (!(distance <= mpm_row_volume(mpm, row) / area)) return;
+  load[(size_t)row * (size_t)mpm_load_width(mpm)][0] += wall->flux * area;
+  wall->heat_flow += wall->flux * area;
+}
+
 /* The flux enters through the outermost layer: points whose domain touches the wall, each with the area of its face. */
 void mpm_heat_walls(Mpm *mpm, MpmVec *load) {
-  const int dimension = mpm->scene.dimension, width = mpm_load_width(mpm);
+  const int dimension = mpm->scene.dimension;
   for (int w = 0; w < mpm->wall_count; w++) {
     MpmWall *wall = &mpm->walls[w];
-    if (wall->heat != MPM_WALL_FLUX) continue;
+    if (wall->heat != MPM_WALL_FLUX || wall->kind == MPM_WALL_SURFACE) continue;
     for (int k = 0; k < mpm->points.own; k++) {
-      double normal[3], vector[3], f[9];
       const MpmVec place = mpm->points.position[k];
       const double position[3] = {place[1], place[2], place[3]};
-      if (!mpm_wall_in_range(wall, dimension, position)) continue;
-      mpm_row_deformation(mpm, k, f);
+      double normal[3];
+      if (!mpm_wall_in_range(wall, dimension, position, 0.0)) continue;
       const double distance = mpm_wall_distance(wall, dimension, position, normal);
-      const double area = mpm_face_area(&mpm->points.home[mpm->points.slot[k]], f, normal, vector);
-      const double layer = mpm_row_volume(mpm, k) / area;
-      if (!(distance <= layer)) continue;
-      load[(size_t)k * (size_t)width][0] += wall->flux * area;
-      wall->heat_flow += wall->flux * area;
+      add_flux(mpm, wall, k, distance, normal, load);
     }
+  }
+  for (int k = 0; k < mpm->wall_scratch.nears; k++) {
+    const MpmNear *near = &mpm->wall_scratch.near[k];
+    if (mpm->walls[near->wall].heat == MPM_WALL_FLUX)
+      add_flux(mpm, &mpm->walls[near->wall], near->row, near->distance, near->normal, load);
   }
 }

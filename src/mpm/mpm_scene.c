@@ -66,7 +66,11 @@ void mpm_point_default(MpmPoint *point) {
 }
 
 MpmWall mpm_wall_default(void) {
-  MpmWall wall = {.kind = MPM_WALL_PLANE, .contact = MPM_WALL_NO_CONTACT, .separable = 1, .heat = MPM_WALL_ADIABATIC};
+  MpmWall wall = {.kind = MPM_WALL_PLANE,
+                  .contact = MPM_WALL_NO_CONTACT,
+                  .separable = 1,
+                  .heat = MPM_WALL_ADIABATIC,
+                  .sides = MPM_SIDE_FRONT | MPM_SIDE_BACK};
   for (int i = 0; i < 3; i++) wall.range[0][i] = -INFINITY, wall.range[1][i] = INFINITY;
   return wall;
 }
@@ -101,8 +105,13 @@ static BaseStatus check_ranges(const MpmWall *wall, int dimension) {
 }
 
 BaseStatus mpm_wall_check(const MpmWall *wall, int dimension, int thermal) {
-  if (wall->kind != MPM_WALL_PLANE && wall->kind != MPM_WALL_BOX)
-    return base_error(BASE_ERROR_ARGUMENT, "wall: kind is %d; allowed: 0 (plane), 1 (box)", (int)wall->kind);
+  if ((int)wall->kind < MPM_WALL_PLANE || wall->kind > MPM_WALL_SURFACE)
+    return base_error(BASE_ERROR_ARGUMENT, "wall: kind is %d; allowed: 0 (plane), 1 (box), 2 (surface)",
+                      (int)wall->kind);
+  if (wall->kind == MPM_WALL_SURFACE && (wall->facet_count < 1 || !wall->facets))
+    return base_error(BASE_ERROR_ARGUMENT, "wall: the surface has no facets");
+  if (wall->kind == MPM_WALL_SURFACE && (wall->sides < 1 || wall->sides > 3))
+    return base_error(BASE_ERROR_ARGUMENT, "wall: sides is %d; allowed: 1 (front), 2 (back), 3 (both)", wall->sides);
   if ((int)wall->contact < MPM_WALL_NO_CONTACT || wall->contact > MPM_WALL_FRICTION)
     return base_error(BASE_ERROR_ARGUMENT, "wall: contact is %d; allowed: 0 to 3", (int)wall->contact);
   if ((int)wall->heat < MPM_WALL_ADIABATIC || wall->heat > MPM_WALL_FLUX)

@@ -58,7 +58,7 @@ void mpm_destroy(Mpm *mpm) {
   if (!mpm) return;
   mpm_points_free(mpm);
   mpm_grid_free(&mpm->grid);
-  base_free(mpm->contacts);
+  mpm_wall_free(mpm);
   base_free(mpm->tractions);
   base_free(mpm);
 }
@@ -149,7 +149,7 @@ static void forget_errors(Mpm *mpm) {
 static double halo_reach(const Mpm *mpm) {
   const MpmScene *scene = &mpm->scene;
   const double cells = scene->shape == MPM_SHAPE_LINEAR ? 2.0 : scene->shape == MPM_SHAPE_GIMP ? 3.5 : 3.0;
-  return fmax(mpm->spacing[0], fmax(mpm->spacing[1], mpm->spacing[2])) * (cells + 1e-6);
+  return mpm_largest_spacing(mpm) * (cells + 1e-6);
 }
 
 /* Copies of foreign points. Collective. */
@@ -247,6 +247,7 @@ static BaseStatus advance(Mpm *mpm) {
     if (mpm->scene.transfer == MPM_TRANSFER_XPIC) TRY(mpm_extended_velocity(mpm));
   }
   mpm_g2p_update(mpm);
+  if (mpm->scene.mechanical) mpm_wall_guard(mpm);
   return BASE_OK;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Walls as conditions on nodal velocities. Nodes at or beyond a wall (to round-off) are under its condition.
+/* Walls as conditions on nodal velocities: the response. mpm_wall_shape.c and mpm_wall_facet.c find the nodes.
  *
  * The condition is applied twice. Before the update to v_I alone, so that the velocity gradient respects the wall; the
  * FLIP points do not feel that change. Then to v_I + a_I dt, as impulses: they are what the points feel. Several walls
@@ -7,77 +7,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "../base/tensor.h"
 #include "mpm_core.h"
 
 enum { SWEEPS = 20 };
-static const double ROUND_OFF = 1e-8; /* of the spacing: a moving wall's position is itself a sum of many steps */
 
-int mpm_wall_in_range(const MpmWall *wall, int dimension, const double x[3]) {
-  for (int i = 0; i < dimension; i++)
-    if (!(x[i] >= wall->range[0][i] && x[i] <= wall->range[1][i])) return 0;
-  return 1;
-}
-
-/* Distance of x from a box: outside the largest distance along an axis, inside minus the depth under the nearest face,
- * whose normal is returned. `preferred` (or NULL) decides between faces that are equally near: the one that it runs
- * into most. */
-static double box_distance(const MpmWall *wall, int dimension, const double x[3], const double *preferred,
-                           double tolerance, double normal[3]) {
-  double best = -INFINITY, best_speed = 0.0;
-  for (int i = 0; i < dimension; i++)
-    for (int side = -1; side <= 1; side += 2) {
-      const double distance = side < 0 ? wall->low[i] - x[i] : x[i] - wall->high[i];
-      const double speed = preferred ? side * (preferred[i] - wall->velocity[i]) : 0.0;
-      const int is_tie = fabs(distance - best) <= tolerance;
-      if (is_tie ? speed >= best_speed : distance < best) continue;
-      best = is_tie && best > distance ? best : distance;
-      best_speed = speed;
-      normal[0] = normal[1] = normal[2] = 0.0;
-      normal[i] = side;
-    }
-  return best;
-}
-
-double mpm_wall_distance(const MpmWall *wall, int dimension, const double x[3], double normal[3]) {
-  if (wall->kind == MPM_WALL_BOX) return box_distance(wall, dimension, x, NULL, 0.0, normal);
-  double distance = 0.0;
-  for (int i = 0; i < dimension; i++) distance += (x[i] - wall->point[i]) * wall->normal[i];
-  memcpy(normal, wall->normal, sizeof wall->normal);
-  return distance;
-}
-
-/* Area vectors of a deformed face a: V0 / size_a cof(F) e_a (Nanson), turned to the side of the normal. */
-double mpm_face_area(const MpmPoint *point, const double f[9], const double normal[3], double area[3]) {
-  double inverse[9], largest = 0.0;
-  tensor_inverse(f, inverse);
-  const double volume = point->volume0 * tensor_determinant(f);
-  area[0] = area[1] = area[2] = 0.0;
-  for (int a = 0; a < 3; a++) {
-    if (!(point->size0[a] > 0.0)) continue;
-    const double *row = inverse + 3 * a; /* (F^-T)_ia */
-    const double projection = volume / point->size0[a] * (normal[0] * row[0] + normal[1] * row[1] + normal[2] * row[2]);
-    if (!(fabs(projection) > largest)) continue;
-    largest = fabs(projection);
-    for (int i = 0; i < 3; i++) area[i] = copysign(volume / point->size0[a], projection) * row[i];
-  }
-  return largest;
-}
-
-static int is_under(const Mpm *mpm, const MpmWall *wall, int node, double normal[3]) {
-  const MpmScene *scene = &mpm->scene;
-  const double tolerance = ROUND_OFF * scene->spacing;
-  double x[3] = {0.0, 0.0, 0.0}, velocity[3];
-  for (int i = 0; i < scene->dimension; i++) {
-    x[i] = scene->origin[i] + mpm->spacing[i] * mpm->grid.index[node][i];
-    if (!(x[i] >= wall->range[0][i] - tolerance && x[i] <= wall->range[1][i] + tolerance)) return 0;
-  }
-  if (wall->kind == MPM_WALL_PLANE) return mpm_wall_distance(wall, scene->dimension, x, normal) <= tolerance;
-  for (int i = 0; i < 3; i++) velocity[i] = mpm->grid.state[node][1 + i];
-  return box_distance(wall, scene->dimension, x, velocity, tolerance, normal) <= tolerance;
-}
-
-static BaseStatus add_contact(Mpm *mpm, int node, int wall, const double normal[3]) {
+BaseStatus mpm_wall_add(Mpm *mpm, int node, int wall, const double normal[3], const double velocity[3]) {
   if (mpm->contact_count == mpm->contact_room) {
     const size_t room = 2 * (size_t)mpm->contact_room + 256;
     TRY(BASE_GROW((size_t)mpm->contact_count, room, &mpm->contacts));
@@ -86,25 +20,29 @@ static BaseStatus add_contact(Mpm *mpm, int node, int wall, const double normal[
   MpmContact *contact = &mpm->contacts[mpm->contact_count];
   *contact = (MpmContact){.node = node, .wall = wall, .is_first = mpm->grid.contact_of[node] == 0};
   memcpy(contact->normal, normal, sizeof contact->normal);
+  memcpy(contact->velocity, velocity, sizeof contact->velocity);
   mpm->grid.contact_of[node] = 1;
   if (!contact->is_first) mpm->has_corners = 1;
   mpm->contact_count++;
   return BASE_OK;
 }
 
+static BaseStatus find_one(Mpm *mpm, int w) {
+  MpmWall *wall = &mpm->walls[w];
+  double normal[3];
+  for (int i = 0; i < 3; i++) wall->reaction[i] = 0.0;
+  wall->power_friction = wall->power_motion = wall->heat_flow = 0.0;
+  if (wall->kind == MPM_WALL_SURFACE) return mpm_surface_find(mpm, w);
+  if (wall->contact == MPM_WALL_NO_CONTACT && wall->heat != MPM_WALL_TEMPERATURE) return BASE_OK;
+  for (int n = 0; n < mpm->grid.nodes; n++)
+    if (mpm_wall_is_under(mpm, wall, n, normal)) TRY(mpm_wall_add(mpm, n, w, normal, wall->velocity));
+  return BASE_OK;
+}
+
 BaseStatus mpm_wall_find(Mpm *mpm) {
-  MpmGrid *grid = &mpm->grid;
-  mpm->contact_count = mpm->has_corners = 0;
-  for (int n = 0; n < grid->nodes; n++) grid->contact_of[n] = 0;
-  for (int w = 0; w < mpm->wall_count; w++) {
-    MpmWall *wall = &mpm->walls[w];
-    double normal[3];
-    for (int i = 0; i < 3; i++) wall->reaction[i] = 0.0;
-    wall->power_friction = wall->heat_flow = 0.0;
-    if (wall->contact == MPM_WALL_NO_CONTACT && wall->heat != MPM_WALL_TEMPERATURE) continue;
-    for (int n = 0; n < grid->nodes; n++)
-      if (is_under(mpm, wall, n, normal)) TRY(add_contact(mpm, n, w, normal));
-  }
+  mpm->contact_count = mpm->has_corners = mpm->wall_scratch.nears = 0;
+  for (int n = 0; n < mpm->grid.nodes; n++) mpm->grid.contact_of[n] = 0;
+  for (int w = 0; w < mpm->wall_count; w++) TRY(find_one(mpm, w));
   return BASE_OK;
 }
 
@@ -130,14 +68,14 @@ static void respond(const MpmWall *wall, const double normal[3], const double fr
 }
 
 /* One contact of the iteration: takes its own earlier change back, answers anew. Returns the size of the correction. */
-static double relax(const MpmWall *wall, const double normal[3], int dimension, int with_friction, double change[3],
+static double relax(const MpmWall *wall, const MpmContact *contact, int dimension, int with_friction, double change[3],
                     MpmVec *velocity) {
   double free[3] = {0.0, 0.0, 0.0}, answer[3], correction = 0.0;
-  for (int i = 0; i < dimension; i++) free[i] = (*velocity)[1 + i] - wall->velocity[i] - change[i];
-  respond(wall, normal, free, with_friction, answer);
+  for (int i = 0; i < dimension; i++) free[i] = (*velocity)[1 + i] - contact->velocity[i] - change[i];
+  respond(wall, contact->normal, free, with_friction, answer);
   for (int i = 0; i < dimension; i++) {
     correction = fmax(correction, fabs(answer[i] - change[i]));
-    (*velocity)[1 + i] = wall->velocity[i] + (free[i] + answer[i]); /* no-slip: the wall's velocity exactly */
+    (*velocity)[1 + i] = contact->velocity[i] + (free[i] + answer[i]); /* no-slip: the wall's velocity exactly */
     change[i] = answer[i];
   }
   return correction;
@@ -152,7 +90,7 @@ static void iterate(Mpm *mpm, MpmVec *field, int is_update) {
       MpmContact *contact = &mpm->contacts[c];
       const MpmWall *wall = &mpm->walls[contact->wall];
       if (wall->contact == MPM_WALL_NO_CONTACT) continue;
-      correction = fmax(correction, relax(wall, contact->normal, mpm->scene.dimension, is_update,
+      correction = fmax(correction, relax(wall, contact, mpm->scene.dimension, is_update,
                                           is_update ? contact->change : contact->start, &field[contact->node]));
     }
     if (correction == 0.0) break;
@@ -176,12 +114,14 @@ static void add_outputs(Mpm *mpm, const MpmContact *contact) {
   const double felt = scene->transfer == MPM_TRANSFER_FLIP ? scene->pic_fraction : 1.0;
   double normal_change = 0.0, work = 0.0;
   for (int i = 0; i < scene->dimension; i++) {
-    wall->reaction[i] += mass * (contact->change[i] + felt * contact->start[i]) / mpm->dt;
+    const double force = mass * (contact->change[i] + felt * contact->start[i]) / mpm->dt;
+    wall->reaction[i] += force;
+    wall->power_motion += force * contact->velocity[i];
     normal_change += contact->change[i] * contact->normal[i];
   }
   if (wall->contact != MPM_WALL_FRICTION) return;
   for (int i = 0; i < scene->dimension; i++) {
-    const double slip = 0.5 * (mpm->grid.state[n][1 + i] + mpm->grid.rate[n][1 + i]) - wall->velocity[i];
+    const double slip = 0.5 * (mpm->grid.state[n][1 + i] + mpm->grid.rate[n][1 + i]) - contact->velocity[i];
     work -= mass * (contact->change[i] - normal_change * contact->normal[i]) * slip;
   }
   wall->power_friction += work / mpm->dt;
@@ -202,4 +142,54 @@ void mpm_wall_update(Mpm *mpm) {
     if (!mpm->contacts[c].is_first) continue;
     for (int i = 1; i < 4; i++) grid->rate[n][i] = (grid->rate[n][i] - grid->state[n][i]) / mpm->dt;
   }
+}
+
+/* ------------------------------------------------------------------------------------------- points at surfaces */
+
+/* Nodes hold a body, but where it thins out or slides far along an inclined surface single points may drift through the
+ * part of a cell that no node guards. A point closer than a quarter of its width comes no closer: it is held as a node
+ * is, with friction. In bodies that are not squeezed to half their width this never acts. */
+static void guard(const MpmNear *near, MpmWall *wall, int dimension, double dt, const double size0[3], MpmVec *position,
+                  MpmVec *velocity) {
+  const double mass = (*position)[0];
+  double width = INFINITY, moved = 0.0, free[3] = {0.0, 0.0, 0.0}, change[3];
+  for (int i = 0; i < dimension; i++) {
+    width = fmin(width, size0[i]);
+    moved += ((*position)[1 + i] - near->place[i] - dt * near->velocity[i]) * near->normal[i];
+    free[i] = (*velocity)[1 + i] - near->velocity[i];
+  }
+  const double missing = fmin(near->distance, 0.25 * width) - (near->distance + moved);
+  if (!(missing > 0.0)) return;
+  for (int i = 0; i < dimension; i++) (*position)[1 + i] += missing * near->normal[i];
+  respond(wall, near->normal, free, 1, change);
+  double normal_change = 0.0, work = 0.0;
+  for (int i = 0; i < dimension; i++) normal_change += change[i] * near->normal[i];
+  for (int i = 0; i < dimension; i++) {
+    const double force = mass * change[i] / dt, slip = free[i] + 0.5 * change[i];
+    (*velocity)[1 + i] += change[i];
+    wall->reaction[i] += force;
+    wall->power_motion += force * near->velocity[i];
+    work -= mass * (change[i] - normal_change * near->normal[i]) * slip;
+  }
+  if (wall->contact == MPM_WALL_FRICTION) wall->power_friction += work / dt;
+}
+
+void mpm_wall_guard(Mpm *mpm) {
+  MpmPoints *p = &mpm->points;
+  for (int k = 0; k < mpm->wall_scratch.nears; k++) {
+    const MpmNear *near = &mpm->wall_scratch.near[k];
+    MpmWall *wall = &mpm->walls[near->wall];
+    if (near->row < p->live && wall->contact != MPM_WALL_NO_CONTACT)
+      guard(near, wall, mpm->scene.dimension, mpm->dt, p->home[p->slot[near->row]].size0, &p->position[near->row],
+            &p->motion[near->row]);
+  }
+}
+
+void mpm_wall_free(Mpm *mpm) {
+  MpmWallScratch *scratch = &mpm->wall_scratch;
+  base_free(mpm->contacts);
+  base_free(scratch->nearest);
+  base_free(scratch->side_mass);
+  base_free(scratch->candidate);
+  base_free(scratch->near);
 }
