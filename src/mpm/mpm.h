@@ -34,7 +34,7 @@ typedef struct MpmScene {
   double point_damping;   /* alpha_p, 1/s (eq. 26-27 corrected) */
   double grid_damping;    /* alpha_g, 1/s */
   int thermal;            /* 1: heat is transported */
-  int mechanical;         /* 1 (default); 0: thermal only, points do not move */
+  int mechanical;         /* 1 (default); 0: thermal only: points do not move, the law is not run (conductivities stay) */
   double mass_cutoff;     /* nodes below this fraction of their largest point's mass move with the points' field but
                            * carry no force; default 1e-30 */
   int threads;            /* 0 = OpenMP's own choice */

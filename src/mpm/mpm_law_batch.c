@@ -159,7 +159,7 @@ static void add_heat(const Mpm *mpm, int k, MpmVec *load) {
   const MpmPoint *point = &mpm->points.home[mpm->points.slot[k]];
   const int dimension = mpm->scene.dimension;
   const double volume = mpm_row_volume(mpm, k);
-  load[0][0] = volume * point->heat + point->heat_external;
+  load[0][0] = (mpm->scene.mechanical ? volume * point->heat : 0.0) + point->heat_external;
   for (int j = 0; j < dimension; j++) {
     double flux = 0.0;
     for (int l = 0; l < dimension; l++) flux -= point->conductivity[voigt[j][l]] * point->temperature_gradient[l];

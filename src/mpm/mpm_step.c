@@ -288,7 +288,7 @@ static BaseStatus step_law_first(Mpm *mpm) {
   } else {
     if (mpm->scene.mechanical) mpm_g2p_velocity_gradient(mpm);
     if (mpm->scene.thermal) mpm_g2p_temperature_gradient(mpm);
-    TRY(mpm_law_run(mpm, mpm->dt));
+    if (mpm->scene.mechanical) TRY(mpm_law_run(mpm, mpm->dt)); /* at rest conductivities stay what they were */
   }
   drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
   if (!is_fused) TRY(find_rates(mpm));
@@ -307,8 +307,9 @@ static BaseStatus step_law_last(Mpm *mpm) {
       return BASE_OK;
     }
     mpm_g2p_velocity_gradient(mpm);
+    TRY(mpm_law_run(mpm, mpm->dt));
   }
-  return mpm_law_run(mpm, mpm->dt);
+  return BASE_OK;
 }
 
 static BaseStatus check_time_step(double dt) {
