@@ -197,8 +197,8 @@ int main(int argc, char **argv) {
           return 1;
         }
     const double middle = median_rate(job);
-    printf("MPM %-10s %6d points, %4d steps: %6.2f million point-steps/s on one core (median %.2f, per processor second "
-           "%.2f, before contact %.2f)", job->name, job->count, job->steps, 1e-6 * best_rate(job), 1e-6 * middle,
+    printf("MPM %-10s %6d points, %4d steps: %6.2f million point-steps/s on one core (median %.2f, per processor "
+           "second %.2f, before contact %.2f)", job->name, job->count, job->steps, 1e-6 * best_rate(job), 1e-6 * middle,
            1e-6 * job->processor_rate, 1e-6 * job->approach_rate);
     if (threads > 1) printf(", two cores %.2f times as fast", scaling(job));
     printf("; momentum %.1e, energy %.4f\n", job->momentum, job->energy);
