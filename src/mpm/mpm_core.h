@@ -21,16 +21,16 @@ typedef struct MpmItem {
   int index; /* of whatever is sorted: slot, row, foreign point */
 } MpmItem;
 
-/* An array whose rows move when points change their order; spare: memory of the same size, which changes places. */
+/* An array whose rows move when points change their order; spare: memory of the same size. */
 typedef struct MpmPlane {
   void **rows, **spare;
   size_t width; /* bytes per row */
 } MpmPlane;
 enum { MPM_PLANES_MAX = 32 };
 
-/* Rows `from`, from + 1 ... become rows `to`, to + 1 ..., as far as the next stretch's `to`. */
+/* Rows `from`, from + 1 ... become rows `to`, to + 1 ... */
 typedef struct MpmStretch {
-  int to, from;
+  int to, from, count;
 } MpmStretch;
 
 /* The core's own state. Rows: own points by (cell, tag), then foreign ones by (cell, tag); they move only when points
@@ -69,7 +69,8 @@ typedef struct MpmPoints {
   double *carry;       /* slot: scratch for halo->forward */
   unsigned char *moves; /* own rows: leaves its cell */
   int *mover;           /* rows that leave */
-  MpmStretch *stretch;  /* [stretches + 1] by `to`; the last one marks the end */
+  int *target;          /* their new rows, in the order of item */
+  MpmStretch *stretch;  /* [stretches] of the other rows, upwards */
   int stretches;
   int *foreign_slot;    /* foreign row - own -> the halo's order */
   MpmItem *item, *spare_item;

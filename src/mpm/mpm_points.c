@@ -53,7 +53,8 @@ BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
   }
   TRY(BASE_GROW(0, room, &p->moves));
   TRY(BASE_GROW(0, room, &p->mover));
-  TRY(BASE_GROW(0, 3 * room + 2, &p->stretch));
+  TRY(BASE_GROW(0, room, &p->target));
+  TRY(BASE_GROW(0, 2 * room + 1, &p->stretch));
   TRY(BASE_GROW(0, room, &p->item));
   TRY(BASE_GROW(0, room, &p->spare_item));
   p->room = (int)room;
@@ -94,8 +95,8 @@ void mpm_points_free(Mpm *mpm) {
     base_free(rows), base_free(p->spare[n]);
   }
   for (int n = 0; n < 9; n++) base_free(p->velocity_gradient[n]);
-  void *const memory[] = {p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->mover, p->stretch,
-                          p->foreign_slot, p->item, p->spare_item, p->law_tag, p->law_velocity_gradient,
+  void *const memory[] = {p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->mover, p->target,
+                          p->stretch, p->foreign_slot, p->item, p->spare_item, p->law_tag, p->law_velocity_gradient,
                           p->law_deformation_gradient, p->law_temperature, p->law_temperature_rate, p->batch.stress,
                           p->batch.heat, p->batch.conductivity, p->batch.modulus, p->batch.scalars};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);

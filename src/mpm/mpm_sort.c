@@ -160,73 +160,56 @@ static int find_row(const MpmGrid *grid, const MpmPoints *p, const MpmItem *item
   return low;
 }
 
-/* Rows from `from` on become rows `to` on; joins the stretch before where it can. */
-static void add_stretch(MpmPoints *p, int to, int from) {
-  const MpmStretch *last = p->stretch + p->stretches - 1;
-  if (p->stretches > 0 && last->from + (to - last->to) == from) return;
-  p->stretch[p->stretches++] = (MpmStretch){to, from};
+/* Rows `from`, from + 1 ... become rows `to`, to + 1 ...; rows that stay where they are need no stretch. */
+static void add_stretch(MpmPoints *p, int to, int from, int count) {
+  if (to != from && count > 0) p->stretch[p->stretches++] = (MpmStretch){to, from, count};
 }
 
-/* movers: leaving rows, upwards. items: the same, by (cell, tag). */
-static void find_stretches(Mpm *mpm, const int *mover, int movers) {
+/* mover: leaving rows, upwards; items: the same, by (cell, tag). target[m]: new row of item m. */
+static void find_stretches(Mpm *mpm, int movers) {
   MpmPoints *p = &mpm->points;
   int row = 0, next = 0, left = 0;
   p->stretches = 0;
   for (int m = 0; m <= movers; m++) {
     const int stop = m < movers ? find_row(&mpm->grid, p, &p->item[m]) : p->own;
-    for (; left < movers && mover[left] < stop; left++) {
-      if (mover[left] > row) add_stretch(p, next, row), next += mover[left] - row;
-      row = mover[left] + 1;
+    for (; left < movers && p->mover[left] < stop; left++) {
+      add_stretch(p, next, row, p->mover[left] - row);
+      next += p->mover[left] - row, row = p->mover[left] + 1;
     }
-    if (stop > row) add_stretch(p, next, row), next += stop - row, row = stop;
-    if (m < movers) add_stretch(p, next++, p->item[m].index);
-  }
-  p->stretch[p->stretches] = (MpmStretch){p->own, 0};
-}
-
-/* New rows [first, end), which begin within stretch s. */
-MPM_INLINE void move_range(const MpmPoints *p, const char *rows, char *spare, size_t width, int s, int first, int end) {
-  for (int to = first; to < end; s++) {
-    const int stop = p->stretch[s + 1].to < end ? p->stretch[s + 1].to : end;
-    const char *from = rows + (size_t)(p->stretch[s].from + (to - p->stretch[s].to)) * width;
-    char *target = spare + (size_t)to * width;
-    if (stop - to > 3) memcpy(target, from, (size_t)(stop - to) * width);
-    else
-      for (int k = 0; k < stop - to; k++) memcpy(target + (size_t)k * width, from + (size_t)k * width, width);
-    to = stop;
+    add_stretch(p, next, row, stop - row);
+    next += stop - row, row = stop;
+    if (m < movers) p->target[m] = next++;
   }
 }
 
-static int find_stretch(const MpmPoints *p, int row) {
-  int low = 0, high = p->stretches - 1;
-  while (low < high) {
-    const int middle = high - (high - low) / 2;
-    if (p->stretch[middle].to <= row) low = middle;
-    else high = middle - 1;
-  }
-  return low;
+MPM_INLINE void move_stretch(char *rows, size_t width, MpmStretch s) {
+  if (s.count == 1) memcpy(rows + (size_t)s.to * width, rows + (size_t)s.from * width, width);
+  else memmove(rows + (size_t)s.to * width, rows + (size_t)s.from * width, (size_t)s.count * width);
 }
 
-static void move_rows(Mpm *mpm) {
-  MpmPoints *p = &mpm->points;
-  enum { CHUNK = 1024 };
-#pragma omp parallel for schedule(static) num_threads(mpm->threads) if (mpm_is_parallel(mpm))
-  for (int first = 0; first < p->own; first += CHUNK) {
-    const int end = first + CHUNK < p->own ? first + CHUNK : p->own, s = find_stretch(p, first);
-    for (int n = 0; n < p->planes; n++) {
-      const MpmPlane *plane = &p->plane[n];
-      const char *rows;
-      char *spare;
-      memcpy(&rows, plane->rows, sizeof rows), memcpy(&spare, plane->spare, sizeof spare);
-      if (plane->width == 8) move_range(p, rows, spare, 8, s, first, end);
-      else if (plane->width == 32) move_range(p, rows, spare, 32, s, first, end);
-      else move_range(p, rows, spare, plane->width, s, first, end);
-    }
-  }
-  for (int n = 0; n < p->planes; n++) { /* pointers of several types */
-    void *rows, *spare;
-    memcpy(&rows, p->plane[n].rows, sizeof rows), memcpy(&spare, p->plane[n].spare, sizeof spare);
-    memcpy(p->plane[n].rows, &spare, sizeof rows), memcpy(p->plane[n].spare, &rows, sizeof spare);
+/* Stretches keep their order, so that none overwrites what another still needs if those that go down are moved upwards
+ * and then those that go up downwards; only the movers, which cross them, need memory of their own. */
+MPM_INLINE void move_plane(const MpmPoints *p, const MpmPlane *plane, size_t width, int movers) {
+  char *rows, *spare; /* of several types */
+  memcpy(&rows, plane->rows, sizeof rows), memcpy(&spare, plane->spare, sizeof spare);
+  for (int m = 0; m < movers; m++)
+    memcpy(spare + (size_t)m * width, rows + (size_t)p->item[m].index * width, width);
+  for (int s = 0; s < p->stretches; s++)
+    if (p->stretch[s].to < p->stretch[s].from) move_stretch(rows, width, p->stretch[s]);
+  for (int s = p->stretches - 1; s >= 0; s--)
+    if (p->stretch[s].to > p->stretch[s].from) move_stretch(rows, width, p->stretch[s]);
+  for (int m = 0; m < movers; m++)
+    memcpy(rows + (size_t)p->target[m] * width, spare + (size_t)m * width, width);
+}
+
+static void move_rows(Mpm *mpm, int movers) {
+  const MpmPoints *p = &mpm->points;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(mpm->threads) if (mpm_is_parallel(mpm))
+  for (int n = 0; n < p->planes; n++) {
+    const MpmPlane *plane = &p->plane[n];
+    if (plane->width == 8) move_plane(p, plane, 8, movers);
+    else if (plane->width == 32) move_plane(p, plane, 32, movers);
+    else move_plane(p, plane, plane->width, movers);
   }
 }
 
@@ -260,8 +243,8 @@ BaseStatus mpm_points_order(Mpm *mpm) {
     p->item[m] = (MpmItem){p->key[k], p->tag[k], k};
   }
   mpm_sort_items(&p->item, &p->spare_item, movers);
-  find_stretches(mpm, p->mover, movers);
-  move_rows(mpm);
+  find_stretches(mpm, movers);
+  move_rows(mpm, movers);
   p->has_moved = 1;
   for (int k = 1; k < p->own; k++) /* the order of sums would be ambiguous */
     if (p->tag[k] == p->tag[k - 1] && p->key[k] == p->key[k - 1])
