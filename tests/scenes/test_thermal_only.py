@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from scripts import BOX
-from test_rve_scene import packing
+from test_rve_scene import GRAIN_RADIUS, OVERLAP, packing
 
 SCRIPT = BOX.format(boundary="f f") + """
 lattice sq 0.05 origin 0.5 0.5 0
@@ -31,10 +31,11 @@ run {steps}
 
 
 def test_heat_crosses_packings_that_are_not_run(dempm):
-    """Against the series of a slab, at a time step 10^5 times that of mechanics. k from the hexagonal crystal: sqrt(3) h."""
-    h = 1 / (1e3 * 0.075)  # conductance of a contact per depth times branch length: h l / z_p, l cancels
-    diffusivity = math.sqrt(3) * h / (2650 * math.pi / (2 * math.sqrt(3)) / (1 - 1e-3) ** 2 * 670)
-    dt, steps = 2.0, 1000
+    """Against the series of a slab, at a time step 10^5 times that of mechanics. k of the hexagonal
+    crystal: sqrt(3) / (alpha l z_p)."""
+    length = 2 * GRAIN_RADIUS * (1 - OVERLAP)
+    diffusivity = math.sqrt(3) / (1e3 * length * 0.075) / (2650 * math.pi / (2 * math.sqrt(3)) / (1 - 1e-3) ** 2 * 670)
+    dt, steps = 20.0, 1000
     run = dempm(SCRIPT.format(dt=dt, steps=steps), files={"grains.data": packing(shrink=0.0)}, timeout=60)
     assert set(run.table["mpm[10]"]) == {0.0} and set(run.table["mpm[12]"]) == {0.0} and set(run.table["mpm[5]"]) == {0.0}
     columns = run.dump("field.dump")[-1][1]

@@ -7,7 +7,7 @@ from study import plt
 GRAINS = dict(radius=(0.0025, 0.005), preparation_friction=0.5, density=2650, kn=1e6, kt=1e6, thickness=0.075)
 LAW = dict(kn=1e6, kt=1e6, mu=0.5, density=2650, thickness=0.075, damping__local=0.2)
 # name: (bond strength, case file). Without bonds the strength is not used.
-COLUMNS = {"bare": (0.1, "bare"), "0.02": (0.02, "frozen"), "0.02 melting": (0.02, "melting"), "0.1": (0.1, "frozen"),
+COLUMNS = {"bare": (0.1, "bare"), "0.01": (0.01, "frozen"), "0.02": (0.02, "frozen"), "0.02 melting": (0.02, "melting"), "0.1": (0.1, "frozen"),
            "0.1 melting": (0.1, "melting")}
 ACCELERATION = {False: 25.0, True: 1.0}  # of the heat, by size_verify.inc
 
@@ -43,13 +43,14 @@ class NO_RUN:
 
 
 def bonded_test(study, grains, seeds, pressure, bond):
-    """Biaxial test at constant lateral pressure, mean of several packings: (axial strain, stress in Pa)."""
+    """Biaxial test, mean of several packings: (axial strain, stress in Pa). Strong bonds under 10 kPa break in bursts that no servo
+    follows: the lateral pressure then leaves its value for a moment (6 % rms)."""
     bonds = dict(bond_strength=bond, bond_shear_ratio=0.5) if bond else {}
     strain, stresses = np.linspace(0, 0.095, 191), []
     for seed in range(1, seeds + 1):
         packing = study.pack(f"strength_{pressure:g}_{seed}", grains=grains, seed=seed, pressure=pressure, **GRAINS)
-        answer = study.element(f"strength_{pressure:g}_{seed}_{bond}", packing, "biaxial", pressure=pressure, rate=0.2, strain=0.1,
-                               stress_tolerance=0.1, **bonds, **LAW)
+        answer = study.element(f"strength_{pressure:g}_{seed}_{bond}", packing, "biaxial", pressure=pressure, rate=0.05, strain=0.1,
+                               stress_tolerance=0.5, **bonds, **LAW)
         stresses.append(np.interp(strain, 1 - answer["Fyy"], -answer["syy"]))
     return strain, np.mean(stresses, axis=0)
 
@@ -59,7 +60,8 @@ def bonded_test(study, grains, seeds, pressure, bond):
 
 def collapse(study):
     size, grains = ("paper", 400) if study.full else ("verify", 100)
-    packing = study.pack("column", pressure=1e4, grains=grains, **GRAINS)
+    # Seed 7: a packing of mean strength. 100 grains scatter by a factor of two (43 to 92 kPa at 0.02), 400 by a fifth (37 to 52).
+    packing = study.pack("column", pressure=1e4, grains=grains, seed=5 if study.full else 7, **GRAINS)
     common = {"size": size, "packing": packing.name, "rest": "1e-3"}
     settled = study.run("settle", "in.settle", common, ["column_collapse"], [packing], grains=grains)
     runs = {}
@@ -69,6 +71,7 @@ def collapse(study):
                                {**common, **duration, "case": case, "beta_b": bond, "settled": "settled.restart"},
                                ["column_collapse"], [packing, settled.path / "out" / "settled.restart"], grains=grains)
     judge(study, runs, ACCELERATION[study.full])
+    compare_with_strength(study, runs, packing)
     draw(study, runs)
 
 
@@ -91,14 +94,30 @@ def judge(study, runs, acceleration):
     text = ", ".join(f"{name}: {time:.2f} s" if np.isfinite(time) else f"{name}: stands" for name, time in failure.items())
     study.note(f"The front has gone 0.1 m at: {text}. Heat flows {acceleration:g} times as fast as in the paper.")
     study.check("no bonds: time until the front has gone 0.1 m, s (at once)", failure["bare"], 0.25, runs["bare"])
-    study.check("0.02: time until then, s (fails too)", failure["0.02"], series(runs["0.02"])[0][-1], runs["0.02"])
-    study.check("0.02: that time of the bare column over its own (later)", failure["bare"] / failure["0.02"], 1.0, runs["0.02"])
+    study.check("0.01: time until then, s (fails too)", failure["0.01"], 0.8, runs["0.01"])
+    study.check("0.01: that time of the bare column over its own (later)", failure["bare"] / failure["0.01"], 1.0, runs["0.01"])
     front = series(runs["0.1"])[1]
     study.check("0.1: way of the front, m (stands)", front.max() - front[0], 0.05, runs["0.1"])
-    melting = failure["0.1 melting"] * acceleration
-    study.check("0.1 melting: time of failure in the paper's time over 15 s, deviation", abs(melting / 15 - 1), 0.5, runs["0.1 melting"])
+    # Only the heat is faster: falling takes as long as that of the bare column.
+    melting = (failure["0.1 melting"] - failure["bare"]) * acceleration
+    study.check("0.1 melting: start of the failure in the paper's time over 15 s, deviation", abs(melting / 15 - 1), 0.5,
+                runs["0.1 melting"])
     lower = series(runs["0.02 melting"])[3][-1] / np.interp(series(runs["0.02 melting"])[0][-1], series(runs["0.02"])[0], series(runs["0.02"])[3])
     study.check("0.02: potential energy at the end, melting over not melting", lower, 1.0, runs["0.02 melting"])
+
+
+def compare_with_strength(study, runs, packing):
+    """A column of bonded grains stands if its packing bears the weight at the foot without lateral pressure: a reference of its own
+    for what the paper shows at one strength only."""
+    foot = 2.0 * 9.8 * runs["bare"].table["mpm[1]"][0] / 4.0
+    for name, bond in (("0.01", 0.01), ("0.02", 0.02), ("0.1", 0.1)):
+        answer = study.element(f"unconfined_{bond}", packing, "biaxial", pressure=500, rate=0.02, strain=0.02, stress_tolerance=50,
+                               bond_strength=bond, bond_shear_ratio=0.5, **LAW)
+        strength = -answer["syy"].min()
+        stands, should_stand = not np.isfinite(fails_at(runs[name])), strength > foot
+        is_clear = abs(strength / foot - 1) > 0.1
+        study.check(f"{name}: 1 if the column does not do what its packing's strength ({strength / 1e3:.0f} kPa against {foot / 1e3:.0f} kPa "
+                    "at the foot) says", stands != should_stand, 0 if is_clear else None, runs[name])
 
 
 def draw(study, runs):

@@ -4,6 +4,7 @@
 A case is a module case_NAME with verify(study), which runs scripts from examples/ by study.run(...) and states errors by
 study.check(...)."""
 import dataclasses
+import hashlib
 import json
 import os
 import pathlib
@@ -53,22 +54,24 @@ class Study:
 
     def run(self, name, script, variables=None, folders=(), files=(), grains=0, timeout=None, ranks=1, threads=THREADS):
         """Runs a script of examples/ in a folder of its own, with the files of `folders` (of examples/) beside it. A run
-        that has ended with the same variables and the same program is not repeated: its results are read again. A variable's
+        that has ended with the same variables, files and program is not repeated: its results are read again. A variable's
         value is one word of the command line, spaces and all; a list gives several."""
         path = self.folder / name
         variables = {key: [str(v) for v in value] if isinstance(value, (list, tuple)) else [str(value)]
                      for key, value in (variables or {}).items()}
         program = BUILD / "dempm"
         mark = path / "finished.json"
-        wanted = {"script": str(script), "variables": variables, "program": program.stat().st_mtime}
+        sources = [f for folder in folders for f in (EXAMPLES / folder).iterdir() if f.is_file()] + list(files)
+        digest = hashlib.sha256()
+        for source in sorted(sources, key=lambda f: f.name):
+            digest.update(source.name.encode() + source.read_bytes())
+        wanted = {"script": str(script), "variables": variables, "program": program.stat().st_mtime, "files": digest.hexdigest()}
         if mark.exists() and json.loads(mark.read_text())["wanted"] == wanted:
             return self.read(path, json.loads(mark.read_text()), grains)
-        keep = self.full and path.exists()  # an interrupted run of full size: its restart files are there
-        if not keep:
-            shutil.rmtree(path, ignore_errors=True)
-        path.mkdir(parents=True, exist_ok=True)
-        for file in [f for folder in folders for f in (EXAMPLES / folder).iterdir() if f.is_file()] + list(files):
-            shutil.copy(file, path)
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True)
+        for source in sources:
+            shutil.copy(source, path)
         (path / "out").mkdir(exist_ok=True)
         command = [program, "-in", script] + [w for key, value in variables.items() for w in ("-var", key, *value)]
         if ranks > 1:

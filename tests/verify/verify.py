@@ -5,7 +5,7 @@
    verify.py [--full] [case ...]        from the root (make verify, make verify-full)
 
 Writes build/verify (build/verify-full): report.json, report.md, figures. Ends with 1 if a bound is missed or a run fails. A
-finished run is not repeated; an interrupted one of full size goes on from its last restart file."""
+finished run is not repeated, so that an interrupted verification goes on with the run that was cut."""
 import argparse
 import importlib
 import json
