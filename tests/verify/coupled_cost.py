@@ -126,7 +126,7 @@ class Biaxial:
     name = "biaxial"
     base = dict(grid=0.2, spacing=0.1, grains=100, substeps=10, dt=1e-3, transfer="flip 0.999")
     changes = [("grid", dict(grid=0.4, spacing=0.2)), ("grid", dict(grid=0.1, spacing=0.05)),
-               ("points per cell", dict(spacing=0.2)), ("points per cell", dict(grid=0.4)),
+               ("points per cell", dict(spacing=0.2, grid=0.25)), ("points per cell", dict(grid=0.4)),
                ("grains", dict(grains=50)), ("grains", dict(grains=200)), ("grains", dict(grains=400)),
                ("sub-steps", dict(substeps=5)), ("sub-steps", dict(substeps=20)),
                ("time step", dict(dt=2e-3)), ("time step", dict(dt=5e-4)), ("transfer", dict(transfer="apic")),
