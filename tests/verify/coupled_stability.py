@@ -75,7 +75,7 @@ region column block 0 0.2 0 0.8 -0.025 0.025 units box
 create_atoms 1 region column
 """ + MATERIAL + """
 fix rve all mpm/rve packing small.packing model hooke/stiffness tangential history grain disk thickness 0.075 &
-  density 2650 damping viscous 0.2 rest 1e-3
+  density 2650 damping viscous 0.2 rest {rest}
 fix mpm all mpm/couple grid 0.2 shape gimp transfer flip 0.99 material rve rve damping/point 20
 fix g all gravity 9.81 vector 0 -1 0
 fix floor all mpm/wall mpm plane y 0 friction 0.5 side +
@@ -177,22 +177,23 @@ def make_shear():
 
 # --------------------------------------------------------------------------------------------------------------- column
 def make_column():
+    """With packings at rest left out, and for a quarter of the steps with all of them run."""
     study = Study("column", FOLDER, False)
     small = study.pack("small", pressure=1e4, preparation_friction=0.5, grains=32, **GRAINS)
-    tables, seconds, memory = script_run("run", COLUMN.format(steps=STEPS, every=max(STEPS // 200, 1)), small)
-    table = {name: np.array(values) for name, values in tables[-1].items()}
-    settled = memory[len(memory) // 10:]
-    result = {"steps": STEPS, "seconds": seconds, "points": 16, "grains": 32,
-              "computed": (table["mpm[12]"][-1] - table["mpm[12]"][0]), "memory_kB": [memory[len(memory) // 10][1], memory[-1][1]],
-              "memory_largest_kB": max(kb for _, kb in settled), "memory_readings": len(memory),
-              "top": [table["top"][0], table["top"][-1], table["top"].min(), table["top"].max()],
-              "mean_height": [table["mean"][0], table["mean"][-1], table["mean"].min(), table["mean"].max()],
-              "elastic_energy": [table["mpm[7]"][0], table["mpm[7]"][-1], table["mpm[7]"].min(), table["mpm[7]"].max()],
-              "kinetic_energy": [table["mpm[5]"][0], table["mpm[5]"][-1], table["mpm[5]"].max()],
-              "floor_force": [table["floor[2]"][0], table["floor[2]"][-1]],
-              "frictional_heat": table["mpm[9]"][-1] - table["mpm[9]"][0]}
-    print(json.dumps(write("column", result), indent=1), flush=True)
-    return table, memory
+    found, results = {}, {}
+    for rest, steps in (("1e-3", STEPS), ("no", STEPS // 4)):
+        name = f"column_rest_{rest}"
+        tables, seconds, memory = script_run(name, COLUMN.format(rest=rest, steps=steps, every=max(steps // 200, 1)), small)
+        table = {column: np.array(values) for column, values in tables[-1].items()}
+        summary = {column: [table[key][0], table[key][len(table[key]) // 2], table[key][-1], table[key].min(), table[key].max()]
+                   for column, key in (("top", "top"), ("mean_height", "mean"), ("elastic_energy", "mpm[7]"),
+                                       ("kinetic_energy", "mpm[5]"), ("floor_force", "floor[2]"), ("friction_heat", "mpm[9]"))}
+        late = [kilobytes for _, kilobytes in memory[len(memory) // 10:]]
+        results[rest] = {"steps": steps, "seconds": seconds, "particle_steps": table["mpm[12]"][-1] - table["mpm[12]"][0],
+                         "memory_kB": [late[0], late[-1], max(late)], "memory_readings": len(late), **summary}
+        found[rest] = table, memory
+    print(json.dumps(write("column", results), indent=1), flush=True)
+    return found
 
 
 def draw(curves, column):
@@ -205,14 +206,16 @@ def draw(curves, column):
         axis.set(title=title, xlabel="shear strain")
     axes[0, 1].set_yscale("log")
     axes[0, 0].legend(fontsize=7, frameon=False)
-    table, memory = column
-    steps = (table["Step"] - table["Step"][0]) / 1e3
-    axes[1, 0].plot(steps, 1e6 * (table["mean"] / table["mean"][0] - 1), lw=0.8)
-    axes[1, 0].set(title="column: change of mean height, 1e-6", xlabel="thousand steps")
-    axes[1, 1].plot(steps, 1e3 * (table["mpm[7]"] / table["mpm[7]"][0] - 1), lw=0.8)
-    axes[1, 1].set(title="change of elastic energy, 1e-3", xlabel="thousand steps")
-    axes[1, 2].plot([t for t, _ in memory], [kb / 1024 for _, kb in memory], lw=0.8)
-    axes[1, 2].set(title="resident memory, MB", xlabel="wall time, s", ylim=(0, None))
+    for rest, (table, memory) in column.items():
+        steps = (table["Step"] - table["Step"][0]) / 1e3
+        axes[1, 0].plot(steps, 1e6 * (table["mean"] / table["mean"][0] - 1), lw=0.8, label=f"rest {rest}")
+        axes[1, 1].plot(steps, 1e3 * (table["mpm[7]"] / table["mpm[7]"][0] - 1), lw=0.8)
+        axes[1, 2].plot(np.linspace(0, steps[-1], len(memory)), [kilobytes / 1024 for _, kilobytes in memory], lw=0.8)
+    for axis, title in zip(axes[1], ("settled column: change of mean height, 1e-6", "change of elastic energy, 1e-3",
+                                     "resident memory, MB")):
+        axis.set(title=title, xlabel="thousand steps")
+    axes[1, 0].legend(fontsize=7, frameon=False)
+    axes[1, 2].set_ylim(0, None)
     figure.tight_layout()
     figure.savefig(FOLDER / "long_runs.png", dpi=90)
     plt.close(figure)
