@@ -237,7 +237,7 @@ help:
 	@echo "make verify       the cases of TM-DEMPM against their references, error beside seconds (verify-full: the papers' sizes; CASES=rod)"
 	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
 	@echo "make coupled-cost error against processor time of rod, heated_square and biaxial (doc/verification.md), 12 minutes; CASES=rod"
-	@echo "make coupled-stability   time step against PIC fraction, shear to 10, a settled column for a million steps; 3 minutes"
+	@echo "make coupled-stability   time step against PIC fraction, shear to 10, a settled column for a million steps; 6 minutes"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"
