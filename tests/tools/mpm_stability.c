@@ -3,9 +3,10 @@
  *
  *   mpm_stability linear|gimp|bspline usf|usl|musl [STEPS]
  *
- * One line per pair: courant,pic,largest,last: the largest and the last energy over that at the start, kinetic energy of the mass
- * centre left out. courant = dt (c + v) / h, c of compression waves, v the speed of the body; inf: the run broke off. The disk, 8
- * cells wide with 2 x 2 points per cell, crosses the grid with a tenth of c and starts with random velocities of 1e-3 c. */
+ * One line per pair: courant,pic,largest,last: the largest and the last energy over that at the start, kinetic energy
+ * of the mass centre left out. courant = dt (c + v) / h, c of compression waves, v the speed of the body; inf: the run
+ * broke off. The disk, 8 cells wide with 2 x 2 points per cell, crosses the grid with a tenth of c and starts with
+ * random velocities of 1e-3 c. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Processor time against error of the coupled method: rod, heated_square and biaxial over grid, points per cell, grains per
-packing, DEM steps per call, time step and transfer, one at a time about a base. The section "Cost against error" of
-doc/verification.md.
+"""Processor time against error of the coupled method: rod, heated_square and biaxial over grid, points per cell,
+grains per packing, DEM steps per call, time step and transfer, one at a time about a base. The section "Cost against
+error" of doc/verification.md.
 
-   coupled_cost.py [rod] [heated_square] [biaxial]     from the root, after `make programs`; a quarter of an hour on one core
+   coupled_cost.py [rod] [heated_square] [biaxial]     from the root, after `make programs`; 12 minutes on one core
 
-Writes build/coupled_cost/report.json, table.md and coupled_cost.png. Runs that have ended are not repeated. Cost is user and
-system time of the run, on one thread. Errors: rod against closed forms; the others against a run that is finer than the base in
-grid, packings or both, which has an error of its own."""
+Writes build/coupled_cost/report.json, table.md and coupled_cost.png. Runs that have ended are not repeated. Cost is
+user and system time of the run, on one thread. Errors: rod against closed forms; the others against a run that is finer
+than the base in grid, packings or both, which has an error of its own."""
 import json
 import resource
 import sys
@@ -19,7 +19,8 @@ from study import BUILD, Study, plt
 
 from exact import rod_mean_temperature, rod_temperature, square_temperature
 
-GRAINS = dict(radius=(0.0025, 0.005), pressure=1e5, density=2650, kn=1e6, kt=1e6, thickness=0.075, preparation_friction=0.01)
+GRAINS = dict(radius=(0.0025, 0.005), pressure=1e5, density=2650, kn=1e6, kt=1e6, thickness=0.075,
+              preparation_friction=0.01)
 FOLDER = BUILD / "coupled_cost"
 
 
@@ -48,7 +49,8 @@ class Rod:
     changes = [("grid", dict(cells=25)), ("grid", dict(cells=100, dt=5e-5)),
                ("grains", dict(grains=49)), ("grains", dict(grains=100)), ("grains", dict(grains=196)),
                ("sub-steps", dict(substeps=1)), ("sub-steps", dict(substeps=2)), ("sub-steps", dict(substeps=8)),
-               ("time step", dict(dt=5e-5)), ("time step", dict(dt=2.5e-5)), ("transfer", dict(transfer="apic", dt=5e-5)),
+               ("time step", dict(dt=5e-5)), ("time step", dict(dt=2.5e-5)),
+               ("transfer", dict(transfer="apic", dt=5e-5)),
                ("transfer", dict(transfer="apic", dt=5e-5, load="surface")),
                ("transfer", dict(transfer="xpic 2")), ("transfer", dict(transfer="flip 0.9")),
                ("transfer", dict(transfer="flip 0.999"))]
@@ -67,7 +69,8 @@ class Rod:
             t, x = step * dt, np.array(columns["x"])
             middle = np.array(columns["f_mpm[13]"]) - rod_temperature(x, t)
             heat.append((t, np.max(np.abs(middle))))
-            stress.append((np.mean(columns["f_mpm[1]"]) - still, -self.MODULUS * self.EXPANSION * rod_mean_temperature(t)))
+            expected = -self.MODULUS * self.EXPANSION * rod_mean_temperature(t)
+            stress.append((np.mean(columns["f_mpm[1]"]) - still, expected))
         found, exact = np.array(stress).T
         return seconds, {"temperature": max(error for t, error in heat if t > 0.1499),
                          "mean stress": 100 * np.max(np.abs(found - exact)) / abs(exact[-1])}
@@ -76,7 +79,7 @@ class Rod:
         return {name: self.run(study, name, **settings) for name, settings in each(self)}
 
 
-# ------------------------------------------------------------------------------------------------------------ heated square
+# -------------------------------------------------------------------------------------------------------- heated square
 class Square:
     """0.3 s of a quarter of examples/heated_square."""
     name = "heated_square"
@@ -104,7 +107,7 @@ class Square:
         for step, columns in frames[1:]:
             t = step * dt
             near, middle = (square_temperature(*at, t)[0] for at in
-                            ((np.array(columns["x"])[[centre]], np.array(columns["y"])[[centre]]), (np.array([0.5]),) * 2))
+                            ([np.array(columns[c])[[centre]] for c in "xy"], [np.array([0.5])] * 2))
             curve.append((t, columns["f_mpm[13]"][centre] + middle - near, self.stress((step, columns)) - still))
         return seconds, np.array(curve)
 
@@ -122,7 +125,7 @@ class Square:
                 for name, (seconds, curve) in found.items()}
 
 
-# ------------------------------------------------------------------------------------------------------------------ biaxial
+# -------------------------------------------------------------------------------------------------------------- biaxial
 class Biaxial:
     """3.2 % of strain of examples/biaxial, dense: to the peak, or just past it."""
     name = "biaxial"
@@ -157,7 +160,7 @@ class Biaxial:
                 for name, (seconds, curve) in found.items()}
 
 
-# ------------------------------------------------------------------------------------------------------------------ the rest
+# ------------------------------------------------------------------------------------------------------------- the rest
 CASES = {case.name: case for case in (Rod, Square, Biaxial)}
 COLOURS = dict(zip(["grid", "points per cell", "grains", "sub-steps", "time step", "transfer", "other packings"],
                    ["#0072B2", "#56B4E9", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "0.5"]))
@@ -175,9 +178,9 @@ def each(case):
 
 
 def front(rows, error):
-    """Those that no cheaper one equals within 2 %, nor any beats in both."""
-    return [row for row in rows if not any(o["seconds"] < row["seconds"] and o["errors"][error] < 1.02 * row["errors"][error]
-                                           for o in rows)]
+    """Those whose error no cheaper one comes within 2 % of."""
+    beats = lambda a, b: a["seconds"] < b["seconds"] and a["errors"][error] < 1.02 * b["errors"][error]
+    return [row for row in rows if not any(beats(other, row) for other in rows)]
 
 
 def study_case(case):
@@ -217,12 +220,13 @@ def draw_panel(axis, rows, error, title):
         for row in some:
             at = row["seconds"], row["errors"][error]
             axis.plot([base["seconds"], at[0]], [base["errors"][error], at[1]], color=colour, lw=0.5, alpha=0.5)
-            axis.annotate(row["value"].split(", ")[0].removeprefix("transfer "), at, fontsize=6, color=colour, xytext=(3, 3),
-                          textcoords="offset points", rotation=25)
-        axis.plot([row["seconds"] for row in some], [row["errors"][error] for row in some], "o", color=colour, ms=5, label=name)
+            axis.annotate(row["value"].split(", ")[0].removeprefix("transfer "), at, fontsize=6, color=colour,
+                          xytext=(3, 3), textcoords="offset points", rotation=25)
+        axis.plot([row["seconds"] for row in some], [row["errors"][error] for row in some], "o", color=colour, ms=5,
+                  label=name)
     best = sorted(front(shown, error), key=lambda row: row["seconds"])
-    axis.plot([row["seconds"] for row in best], [row["errors"][error] for row in best], "k--", lw=0.8, drawstyle="steps-post",
-              label="Pareto front")
+    axis.plot([row["seconds"] for row in best], [row["errors"][error] for row in best], "k--", lw=0.8,
+              drawstyle="steps-post", label="Pareto front")
     axis.plot(base["seconds"], base["errors"][error], "k*", ms=11, label="base")
     axis.set(xscale="log", yscale="log")
     axis.set_title(title, fontsize=8)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""How far the method can be driven: time step against PIC fraction, shear to gamma = 10, a settled column for many steps. The
-section "Stability" of doc/verification.md.
+"""How far the method can be driven: time step against PIC fraction, shear to gamma = 10, a settled column for many
+steps. The section "Stability" of doc/verification.md.
 
-   coupled_stability.py [map] [shear] [column]     from the root, after `make programs build/tools/mpm_stability`; 6 minutes
+   coupled_stability.py [map] [shear] [column]     from the root, after `make programs build/tools/mpm_stability`
 
 Writes build/coupled_stability/*.json, mpm_stability.png and long_runs.png. COLUMN_STEPS=100000 shortens the column."""
 import json
@@ -106,8 +106,8 @@ def script_run(name, text, packing):
     (path / packing.name).write_bytes(packing.read_bytes())
     before, start, memory = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic(), []
     with open(path / "screen", "w") as screen:
-        process = subprocess.Popen([str(BUILD / "dempm"), "-in", "in.script"], cwd=path, env=environment(1), stdout=screen,
-                                   stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT)
+        process = subprocess.Popen([str(BUILD / "dempm"), "-in", "in.script"], cwd=path, env=environment(1),
+                                   stdout=screen, stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT)
         while process.poll() is None:
             try:
                 status = open(f"/proc/{process.pid}/status").read()
@@ -164,14 +164,15 @@ def make_shear():
         curves[name] = [answer["Fxy"], -0.5 * (answer["sxx"] + answer["syy"]), answer["sxy"], answer["solid_fraction"]]
     tables, seconds, _ = script_run("layer", SHEAR, dense)
     table = {name: np.array(values) for name, values in tables[-1].items()}
-    curves["layer of 32 points"] = [table["gamma"], -0.5 * (table["sxx"] + table["syy"]), table["sxy"], table["fraction"]]
+    pressure = -0.5 * (table["sxx"] + table["syy"])
+    curves["layer of 32 points"] = [table["gamma"], pressure, table["sxy"], table["fraction"]]
     result = {"layer_seconds": seconds, "layer_gamma": [table[c][-1] for c in ("least", "gamma", "most")],
               "layer_volume_ratio": table["ratio"][-1]}
     for name, (gamma, pressure, shear, fraction) in curves.items():
         late = gamma > 1
         result[name] = {"gamma": gamma[-1], "lines": int(late.sum()),
-                        **{key: [values[late].mean(), values[late].min(), values[late].max(), values[gamma > 9].mean()]
-                           for key, values in (("pressure", pressure), ("ratio", shear / pressure), ("fraction", fraction))}}
+                        **{key: [v[late].mean(), v[late].min(), v[late].max(), v[gamma > 9].mean()] for key, v in
+                           (("pressure", pressure), ("ratio", shear / pressure), ("fraction", fraction))}}
     print(json.dumps(write("shear", result), indent=1), flush=True)
     return curves
 
@@ -184,14 +185,17 @@ def make_column():
     found, results = {}, {}
     for rest in ("1e-3", "no"):
         name = f"column_rest_{rest}"
-        tables, seconds, memory = script_run(name, COLUMN.format(rest=rest, steps=STEPS, every=max(STEPS // 200, 1)), small)
+        script = COLUMN.format(rest=rest, steps=STEPS, every=max(STEPS // 200, 1))
+        tables, seconds, memory = script_run(name, script, small)
         table = {column: np.array(values) for column, values in tables[-1].items()}
-        summary = {column: [table[key][0], table[key][len(table[key]) // 2], table[key][-1], table[key].min(), table[key].max()]
-                   for column, key in (("top", "top"), ("mean_height", "mean"), ("elastic_energy", "mpm[7]"),
-                                       ("kinetic_energy", "mpm[5]"), ("floor_force", "floor[2]"), ("friction_heat", "mpm[9]"))}
+        shown = {"top": "top", "mean_height": "mean", "elastic_energy": "mpm[7]", "kinetic_energy": "mpm[5]",
+                 "floor_force": "floor[2]", "friction_heat": "mpm[9]"}
+        first_middle_last_least_most = lambda v: [v[0], v[len(v) // 2], v[-1], v.min(), v.max()]
+        summary = {name: first_middle_last_least_most(table[key]) for name, key in shown.items()}
         late = [kilobytes for _, kilobytes in memory[len(memory) // 10:]]
-        results[rest] = {"steps": STEPS, "seconds": seconds, "particle_steps": table["mpm[12]"][-1] - table["mpm[12]"][0],
-                         "memory_kB": [late[0], late[-1], max(late)], "memory_readings": len(late), **summary}
+        results[rest] = {"steps": STEPS, "seconds": seconds, "memory_kB": [late[0], late[-1], max(late)],
+                         "particle_steps": table["mpm[12]"][-1] - table["mpm[12]"][0], "memory_readings": len(late),
+                         **summary}
         found[rest] = table, memory
     print(json.dumps(write("column", results), indent=1), flush=True)
     return found
