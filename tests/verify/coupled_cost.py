@@ -14,7 +14,6 @@ import resource
 import sys
 
 import numpy as np
-from matplotlib.ticker import LogFormatter
 from study import BUILD, Study, plt
 
 from exact import rod_mean_temperature, rod_temperature, square_temperature
@@ -220,8 +219,8 @@ def draw_panel(axis, rows, error, title):
         for row in some:
             at = row["seconds"], row["errors"][error]
             axis.plot([base["seconds"], at[0]], [base["errors"][error], at[1]], color=colour, lw=0.5, alpha=0.5)
-            axis.annotate(row["value"].split(", ")[0].removeprefix("transfer "), at, fontsize=6, color=colour,
-                          xytext=(3, 3), textcoords="offset points", rotation=25)
+            name_of = row["value"].split(", ")[0].removeprefix("transfer ").replace("first 101", "other packings")
+            axis.annotate(name_of, at, fontsize=6, color=colour, xytext=(3, 3), textcoords="offset points", rotation=25)
         axis.plot([row["seconds"] for row in some], [row["errors"][error] for row in some], "o", color=colour, ms=5,
                   label=name)
     best = sorted(front(shown, error), key=lambda row: row["seconds"])
@@ -232,7 +231,7 @@ def draw_panel(axis, rows, error, title):
     axis.set_title(title, fontsize=8)
     for ticks in (axis.xaxis, axis.yaxis):
         ticks.set_major_formatter("{x:g}")
-        ticks.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.6)))
+        ticks.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "2346" else "")
         ticks.set_tick_params(which="both", labelsize=7)
     axis.grid(alpha=0.2, which="both")
 
