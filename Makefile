@@ -19,7 +19,8 @@ ROUNDS ?= 5#                       of make bench
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
 PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
-         check-cuda install clean help deps programs validate verify verify-full cost FORCE
+         check-cuda install clean help deps programs validate verify verify-full cost coupled-cost coupled-stability \
+         FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -181,6 +182,10 @@ verify-full: programs
 	$(RUN_ENV) $(PYTHON) tests/verify/verify.py --full $(CASES)
 cost: programs
 	$(RUN_ENV) $(PYTHON) tests/validation/rve_cost_error.py $(if $(QUICK),--quick)
+coupled-cost: programs
+	$(RUN_ENV) $(PYTHON) tests/verify/coupled_cost.py $(CASES)
+coupled-stability: programs $(BUILD)/tools/mpm_stability
+	$(RUN_ENV) $(PYTHON) tests/verify/coupled_stability.py
 
 check-cuda:
 ifeq ($(strip $(NVCC)),)
@@ -231,6 +236,8 @@ help:
 	@echo "make validate     the figures of doc/validation.md; also against LAMMPS and YADE where they are installed"
 	@echo "make verify       the cases of TM-DEMPM against their references, error beside seconds (verify-full: the papers' sizes; CASES=rod)"
 	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
+	@echo "make coupled-cost error against processor time of rod, heated_square and biaxial (doc/verification.md), 12 minutes; CASES=rod"
+	@echo "make coupled-stability   time step against PIC fraction, shear to 10, a settled column for a million steps; 6 minutes"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"

@@ -225,7 +225,8 @@ static void find_order(Mpm *mpm, const MpmPoint *points, int count) {
 BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count) {
   MpmPoints *p = &mpm->points;
   TRY(mpm_points_reserve(mpm, count));
-  const int known = is_known(p, points, count);
+  /* Without a grid for this order nobody could tell which points have left their cells since: they are sorted anew. */
+  const int known = mpm->grid.is_current && is_known(p, points, count);
   p->home = points;
   p->own = p->live = p->count = count;
   p->foreign = 0;

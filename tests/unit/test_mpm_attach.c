@@ -105,8 +105,42 @@ static void attached_points_may_change(void **state) {
   free(points), free(fresh);
 }
 
+/* Points that the caller moves between the first answer and the first step are found where they are. */
+static void points_moved_after_the_first_answer_are_sorted_anew(void **state) {
+  (void)state;
+  const double low[3] = {0.013, 0.02, 0.0};
+  const int number[3] = {8, 6, 1};
+  MpmLaw law = elastic_law(MPM_ELASTIC_PLANE_STRAIN, 1e4, 0.2);
+  MpmPoint *after[2];
+  int count = 0;
+  for (int moves = 0; moves < 2; moves++) {
+    MpmScene scene = mpm_scene_default();
+    scene.dimension = 2, scene.spacing = 0.1;
+    Mpm *mpm;
+    OK(mpm_create(&scene, &law, NULL, &mpm));
+    after[moves] = make_box(2, low, number, 0.05, 1000.0, 1, &count);
+    if (moves) OK(mpm_initialise(mpm, after[moves], count));
+    for (int p = 0; p < count; p++) {
+      double *x = after[moves][p].position, turned = 0.8 * x[0] - 0.6 * x[1];
+      x[1] = 3.0 + 0.6 * x[0] + 0.8 * x[1], x[0] = turned;
+      after[moves][p].velocity[0] = 1.0 + x[1];
+    }
+    if (!moves) OK(mpm_initialise(mpm, after[moves], count));
+    for (int s = 0; s < 20; s++) OK(mpm_step(mpm, after[moves], count, 1e-3));
+    mpm_destroy(mpm);
+  }
+  for (int p = 0; p < count; p++) {
+    assert_memory_equal(after[0][p].position, after[1][p].position, sizeof after[0][p].position);
+    assert_memory_equal(after[0][p].stress, after[1][p].stress, sizeof after[0][p].stress);
+  }
+  free(after[0]);
+  free(after[1]);
+  law.destroy(law.content);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(points_moved_after_the_first_answer_are_sorted_anew),
       cmocka_unit_test(points_may_stay_in_the_core),
       cmocka_unit_test(attached_points_may_change),
   };

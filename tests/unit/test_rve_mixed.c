@@ -4,6 +4,14 @@
 
 #include "cuda_rve/rve_packing.h"
 
+/* Of a stress after one step. Without fused products, as compiled for the sanitizers, positions in two parts lose some of what the
+ * second part holds: 3.2e-5, as much as if the rounding of the cell were lost, which the other build then shows. */
+#ifdef __SANITIZE_ADDRESS__
+static const double ROUND_OFF = 5e-5;
+#else
+static const double ROUND_OFF = 2e-5;
+#endif
+
 static double stress_distance(const RveAnswer *a, const RveAnswer *b) {
   double worst = 0.0, size = 0.0;
   for (int k = 0; k < 6; k++) worst = fmax(worst, fabs(a->stress[k] - b->stress[k])), size = fmax(size, fabs(b->stress[k]));
@@ -82,7 +90,7 @@ static void packings_follow_fp64(void **state) {
       const double loss = fabs(answer[1].damping_work - answer[0].damping_work) / answer[0].damping_work;
       printf("mixed, %dD %s: stress %.1e after one step; after 1e-3 s %.1e, friction %.1e, damping %.1e\n", dim, variant[v],
              once, stress, slip, loss);
-      assert_true(once < 2e-5); /* 3e-5 if the rounding of the cell were lost */
+      assert_true(once < ROUND_OFF);
       assert_true(stress < 5e-4);
       assert_true(loss < 5e-3);
       if (v == 1 || v == 2) assert_true(slip < 5e-3);
