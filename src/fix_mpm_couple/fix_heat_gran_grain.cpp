@@ -2,8 +2,10 @@
 #include "fix_heat_gran_grain.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "atom.h"
+#include "comm.h"
 #include "fix_property_atom.h"
 #include "force.h"
 #include "keyword_parser.h"
@@ -29,15 +31,22 @@ struct BaseWords {
 }  // namespace
 
 FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
-    : FixHeatGran(lammps, 5, BaseWords(arg).words), model_(grain_heat_default()), reach_(0.0) {
+    : FixHeatGran(lammps, 5, BaseWords(arg).words), model_(grain_heat_default()), surface_{}, reach_(0.0) {
+  vector_flag = 1;
+  size_vector = FLOWS;
+  extvector = 1;
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
-                        "layer", "minimum_gap"});
+                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe");
   check_keywords(parser);
-  if (grain_heat_check(&model_) != BASE_OK) parser.fail(base_error_message());
+  convection_ = parser.given("convection"), radiation_ = parser.given("radiation");
+  check_radiation(parser);
+  const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
+  if ((conducts || !(convection_ || radiation_)) && grain_heat_check(&model_) != BASE_OK)
+    parser.fail(base_error_message());
   force_reneighbor = model_.indirect != GRAIN_INDIRECT_NONE;
   next_reneighbor = -1;
 }
@@ -55,7 +64,33 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("reach")) model_.reach = parser.number(NumberRange::positive());
     else if (parser.is("layer")) model_.layer = parser.number(NumberRange::positive());
     else if (parser.is("minimum_gap")) model_.minimum_gap = parser.number(NumberRange::positive());
+    else if (parser.is("convection")) {
+      surface_.coefficient = parser.number(NumberRange::at_least(0.0));
+      surface_.fluid_temperature = parser.number(NumberRange::any());
+    } else if (parser.is("radiation")) {
+      surface_.emissivity = parser.number(NumberRange::between(0.0, 1.0));
+      surface_.surroundings = parser.number(NumberRange::any());
+    } else if (parser.is("absolute_zero")) surface_.absolute_zero = parser.number(NumberRange::any());
   }
+}
+
+/* Fourth powers mean nothing but on an absolute scale. */
+void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
+  if (!radiation_) {
+    if (parser.given("absolute_zero")) parser.fail("keyword 'absolute_zero' has a meaning with 'radiation' only");
+    return;
+  }
+  if (strcmp(update->unit_style, "si") != 0)
+    parser.fail(std::string("keyword 'radiation' needs 'units si', not ") + update->unit_style);
+  const struct {
+    const char *keyword;
+    double temperature;
+  } checks[] = {{"radiation", surface_.surroundings}, {"initial_temperature", T0}};
+  for (const auto &check : checks)
+    if (check.temperature < surface_.absolute_zero)
+      parser.fail(format_text("keyword '%s': the temperature is %g, allowed is a number >= %g; keyword 'absolute_zero' "
+                              "names the absolute zero of another scale",
+                              check.keyword, check.temperature, surface_.absolute_zero));
 }
 
 /* A keyword that the model does not use is a mistake in the script. */
@@ -165,8 +200,28 @@ void FixHeatGranGrain::exchange(int i, int j) {
   }
 }
 
+void FixHeatGranGrain::exchange_with_surroundings() {
+  for (int i = 0; i < atom->nlocal; i++) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    double flows[FLOWS] = {};
+    if (convection_) flows[CONVECTION] = grain_convection(&surface_, atom->radius[i], Temp[i]);
+    if (radiation_) flows[RADIATION] = grain_radiation(&surface_, atom->radius[i], Temp[i]);
+    for (int k = 0; k < FLOWS; k++) heatFlux[i] += flows[k], flow_[k].add(flows[k]);
+  }
+}
+
+double FixHeatGranGrain::compute_vector(int n) {
+  std::vector<DoubleSum> parts(comm->nprocs);
+  MPI_Allgather(&flow_[n], sizeof flow_[n], MPI_BYTE, parts.data(), sizeof flow_[n], MPI_BYTE, world);
+  DoubleSum sum;
+  for (const DoubleSum &part : parts) sum.add(part);
+  return sum.value();
+}
+
 void FixHeatGranGrain::post_force(int) {
   updatePtrs();
+  for (DoubleSum &flow : flow_) flow = DoubleSum();
+  if (convection_ || radiation_) exchange_with_surroundings();
   const NeighList *list = pair_gran->list;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];

@@ -13,6 +13,7 @@ FixStyle(heat/gran/grain,FixHeatGranGrain)
 #include <vector>
 
 #include "../grain_heat/grain_heat.h"
+#include "double_sum.h"
 #include "fix_heat_gran.h"
 
 namespace LAMMPS_NS {
@@ -22,9 +23,11 @@ namespace LAMMPS_NS {
  *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe
  *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
  *       [layer F] [minimum_gap S]
+ *       [convection H T] [radiation EMISSIVITY T] [absolute_zero Z]
  *
  * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that integrates
- * Temp, and the scalar f_ID: sum of m c T, J. */
+ * Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows
+ * into the group in the last step, W: convection, radiation. */
 class FixHeatGranGrain : public FixHeatGran {
  public:
   FixHeatGranGrain(class LAMMPS *, int, char **);
@@ -34,9 +37,15 @@ class FixHeatGranGrain : public FixHeatGran {
   void post_integrate();
   void pre_force(int);
   void post_force(int);
+  double compute_vector(int);
 
  private:
+  enum Flow { CONVECTION, RADIATION, FLOWS };
+
   GrainHeat model_;
+  GrainSurface surface_;
+  bool convection_, radiation_;
+  DoubleSum flow_[FLOWS];            /* W, this rank's part */
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
   std::vector<double> built_;        /* positions when the neighbour list was built */
@@ -45,7 +54,9 @@ class FixHeatGranGrain : public FixHeatGran {
   void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
+  void check_radiation(const class KeywordParser &) const;
   void exchange(int i, int j);
+  void exchange_with_surroundings();
 };
 
 }  // namespace LAMMPS_NS

@@ -103,6 +103,20 @@ double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
  * indirect model. */
 double grain_heat_reach(const GrainHeat *model, double radius);
 
+/* ------------------------------------------------------------------------------------------------- surface */
+/* What a grain exchanges with its surroundings over its whole surface, 4 pi R^2. Temperatures on the scale of the
+ * grains, whose absolute zero is at `absolute_zero` (0 for kelvin, -273.15 for degrees Celsius). */
+typedef struct GrainSurface {
+  double coefficient, fluid_temperature; /* of convection, W/(m2 K), >= 0 */
+  double emissivity, surroundings;       /* 0 to 1; >= absolute_zero */
+  double absolute_zero;
+} GrainSurface;
+/* Heat into a grain of the given radius, m, and temperature, W: Newton's law of cooling. */
+double grain_convection(const GrainSurface *exchange, double radius, double temperature);
+/* Stefan-Boltzmann: sigma emissivity 4 pi R^2 (T_s^4 - T^4), absolute temperatures, W. Surroundings are black or
+ * large. */
+double grain_radiation(const GrainSurface *exchange, double radius, double temperature);
+
 #ifdef __cplusplus
 }
 #endif

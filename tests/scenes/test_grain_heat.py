@@ -255,3 +255,62 @@ def test_restart_continues(before, after, dempm, tmp_path):
     again = dempm(HEAD.format(boundary="p p f") + f"read_restart {tmp_path}/through/half\n" + properties(fix) + fix +
                   OUTPUT.format(every=200) + "run 200\n", np=after, cwd=tmp_path / "again")
     assert deviation(again, through) < (1e-15 if before == after else 1e-13)
+
+
+# ------------------------------------------------------------------------------------------------ surroundings
+APART = [(1, 0.005, 0.01, 0.01, 0.01, 350.0), (2, 0.004, 0.03, 0.01, 0.01, 250.0)]
+FLOWS = "thermo_style custom step atoms f_heat f_heat[1] f_heat[2]\nthermo_modify format float %.17g\n"
+
+
+def alone(words, steps, dt=2e-5, np=1, shift=0.0):
+    """Two grains that never touch; temperatures minus `shift`."""
+    rows = [(*row[:5], row[5] - shift) for row in APART]
+    fix = f"fix heat all heat/gran/grain initial_temperature {300 - shift} direct none {words}\n"
+    script = two_grains(fix, steps, rows).replace("timestep 2e-5", f"timestep {dt}")
+    return script.replace("thermo 1000\n", "thermo 1\n").replace("thermo_style custom step atoms f_heat\n", FLOWS)
+
+
+def area_over_capacity(run):
+    return [4 * math.pi * r * r / (c * m) for c, r, m in zip((0.1, 0.2), last(run, "radius"), last(run, "mass"))]
+
+
+def test_convection_is_exponential_cooling(dempm, tmp_path):
+    """Explicit Euler's own decay to round-off; half the time step halves the distance to the exponential."""
+    rate, errors = None, []
+    for steps in (100, 200):
+        dt = 0.02 / steps
+        run = dempm(alone("convection 60 300", steps, dt), cwd=tmp_path / str(steps))
+        rate = [60 * a for a in area_over_capacity(run)]
+        expected = [300 + (row[5] - 300) * (1 - k * dt) ** steps for row, k in zip(APART, rate)]
+        assert last(run, "f_Temp[0]") == pytest.approx(expected, rel=1e-12)
+        exact = [300 + (row[5] - 300) * math.exp(-k * 0.02) for row, k in zip(APART, rate)]
+        errors.append(max(abs(a - b) for a, b in zip(last(run, "f_Temp[0]"), exact)))
+    assert 0.1 < min(rate) * 0.02 and 1.9 < errors[0] / errors[1] < 2.1 and errors[1] < 0.1
+
+
+def test_radiation_into_the_cold(dempm, tmp_path):
+    """Surroundings at 0 K: T = (T0^-3 + 3 k t)^(-1/3)."""
+    errors = []
+    for steps in (100, 200):
+        run = dempm(alone("radiation 0.9 0", steps, 0.05 / steps), cwd=tmp_path / str(steps))
+        rate = [0.9 * 5.670374419e-8 * a for a in area_over_capacity(run)]
+        exact = [(row[5] ** -3 + 3 * k * 0.05) ** (-1 / 3) for row, k in zip(APART, rate)]
+        errors.append(max(abs(a / b - 1) for a, b in zip(last(run, "f_Temp[0]"), exact)))
+    assert exact[0] < 0.98 * 350 and 1.9 < errors[0] / errors[1] < 2.1 and errors[1] < 1e-3
+
+
+def test_radiation_knows_the_scale_of_celsius(dempm, tmp_path):
+    kelvin = dempm(alone("radiation 0.9 400", 100, 1e-3), cwd=tmp_path / "kelvin")
+    words = "radiation 0.9 126.85 absolute_zero -273.15"
+    celsius = dempm(alone(words, 100, 1e-3, shift=273.15), cwd=tmp_path / "celsius")
+    assert last(kelvin, "f_Temp[0]")[1] > 251.0
+    assert [T + 273.15 for T in last(celsius, "f_Temp[0]")] == pytest.approx(last(kelvin, "f_Temp[0]"), rel=1e-13)
+
+
+@pytest.mark.parametrize("np", [1, 2])
+def test_flows_from_the_surroundings_add_up_to_the_energy(np, dempm):
+    run = dempm(alone("convection 60 320 radiation 0.9 400", 50, 1e-3), np=np)
+    energy, flows = run.table["f_heat"], [run.table[f"f_heat[{k}]"] for k in (1, 2)]
+    assert len(energy) == 51 and min(abs(f) for flow in flows for f in flow[1:]) > 0.0
+    for n in range(1, 51):
+        assert energy[n] - energy[n - 1] == pytest.approx(1e-3 * (flows[0][n] + flows[1][n]), abs=1e-12 * energy[0])

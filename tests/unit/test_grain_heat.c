@@ -370,6 +370,29 @@ static void wrong_models_are_refused(void **state) {
   assert_int_equal(grain_heat_check(&model), BASE_ERROR_ARGUMENT);
 }
 
+/* ------------------------------------------------------------------------------------------------- surface */
+static void surfaces_exchange_heat_by_newton_and_stefan_boltzmann(void **state) {
+  (void)state;
+  const GrainSurface kelvin = {
+      .coefficient = 25.0, .fluid_temperature = 300.0, .emissivity = 0.8, .surroundings = 400.0};
+  const double area = 4.0 * PI * 0.01 * 0.01;
+  double worst = 0.0;
+  note(&worst, grain_convection(&kelvin, 0.01, 350.0), -25.0 * area * 50.0);
+  note(&worst, grain_radiation(&kelvin, 0.01, 500.0), -0.8 * area * 5.670374419e-8 * (625e8 - 256e8));
+  note(&worst, grain_radiation(&kelvin, 0.01, 0.0), 0.8 * area * 5.670374419e-8 * 256e8);
+  /* Near equilibrium: 4 T^3 dT to first order. */
+  const double small = ldexp(1.0, -20);
+  note(&worst, grain_radiation(&kelvin, 0.01, 400.0 - small) / (0.8 * area * 5.670374419e-8),
+       4.0 * 64e6 * small * (1.0 - 1.5 * small / 400.0));
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_radiation(&kelvin, 0.01, 400.0) == 0.0 && grain_convection(&kelvin, 0.01, 300.0) == 0.0);
+  /* The same on the scale of Celsius. */
+  const GrainSurface celsius = {.emissivity = 0.8, .surroundings = 400.0 - 273.15, .absolute_zero = -273.15};
+  worst = 0.0;
+  note(&worst, grain_radiation(&celsius, 0.01, 500.0 - 273.15), grain_radiation(&kelvin, 0.01, 500.0));
+  AT_MOST(worst, 1e-14);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(models_meet_the_reference_values),
@@ -380,6 +403,7 @@ int main(void) {
       cmocka_unit_test(nothing_conducts_beyond_the_reach),
       cmocka_unit_test(deep_overlaps_and_insulators_give_finite_values),
       cmocka_unit_test(wrong_models_are_refused),
+      cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
