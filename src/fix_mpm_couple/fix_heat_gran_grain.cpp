@@ -31,7 +31,12 @@ struct BaseWords {
 }  // namespace
 
 FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
-    : FixHeatGran(lammps, 5, BaseWords(arg).words), model_(grain_heat_default()), surface_{}, reach_(0.0) {
+    : FixHeatGran(lammps, 5, BaseWords(arg).words),
+      model_(grain_heat_default()),
+      surface_{},
+      walls_(lammps),
+      walls_found_(false),
+      reach_(0.0) {
   vector_flag = 1;
   size_vector = FLOWS;
   extvector = 1;
@@ -113,8 +118,9 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
 }
 
 int FixHeatGranGrain::setmask() {
-  const int neighbours = model_.indirect == GRAIN_INDIRECT_NONE ? 0 : FixConst::POST_INTEGRATE | FixConst::PRE_FORCE;
-  return FixHeatGran::setmask() | FixConst::POST_FORCE | neighbours;
+  const int neighbours = model_.indirect == GRAIN_INDIRECT_NONE ? 0 : FixConst::POST_INTEGRATE;
+  return FixHeatGran::setmask() | FixConst::PRE_FORCE | FixConst::POST_FORCE | FixConst::PRE_FINAL_INTEGRATE |
+         neighbours;
 }
 
 void FixHeatGranGrain::init() {
@@ -159,13 +165,32 @@ void FixHeatGranGrain::check_skin() {
 }
 
 void FixHeatGranGrain::setup_pre_force(int) {
+  keep_positions();
+  walls_found_ = false;
+}
+
+void FixHeatGranGrain::initial_integrate(int vflag) {
+  FixHeatGran::initial_integrate(vflag);
+  if (!walls_found_) find_walls();
+}
+
+void FixHeatGranGrain::find_walls() {
+  walls_.take_over(this);
+  walls_found_ = true;
+  if (model_.direct == GRAIN_DIRECT_NONE && !walls_.empty())
+    fix_failed(lmp, this,
+               "'direct none': a wall (fix wall/gran) has a temperature, but only a direct model conducts at walls; "
+               "allowed are batchelor, liggghts and pipe");
+}
+
+void FixHeatGranGrain::keep_positions() {
   if (model_.indirect == GRAIN_INDIRECT_NONE) return;
   built_.resize(3 * (size_t)atom->nlocal);
   for (size_t k = 0; k < built_.size(); k++) built_[k] = atom->x[k / 3][k % 3];
 }
 
-void FixHeatGranGrain::pre_force(int vflag) {
-  if (neighbor->ago == 0) setup_pre_force(vflag);
+void FixHeatGranGrain::pre_force(int) {
+  if (neighbor->ago == 0) keep_positions();
 }
 
 /* LIGGGHTS builds the list anew when a grain has moved by half the skin, which is early enough for contacts. Pairs
@@ -229,5 +254,19 @@ void FixHeatGranGrain::post_force(int) {
       const int j = list->firstneigh[i][k] & NEIGHMASK;
       if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j);
     }
+  }
+}
+
+/* Here and not in post_force(): walls may come after this fix. */
+void FixHeatGranGrain::pre_final_integrate() {
+  updatePtrs();
+  for (const WallContact &contact : walls_.find_contacts()) {
+    const int i = contact.grain;
+    if (!(atom->mask[i] & groupbit)) continue;
+    const double k[2] = {conductivity_[atom->type[i]], conductivity_[contact.type]};
+    const double h = grain_heat_wall_conductance(&model_, atom->radius[i], k, contact.distance);
+    const double flow = h * (contact.temperature - Temp[i]);
+    heatFlux[i] += flow;
+    flow_[WALLS].add(flow);
   }
 }

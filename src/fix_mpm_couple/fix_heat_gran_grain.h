@@ -15,6 +15,7 @@ FixStyle(heat/gran/grain,FixHeatGranGrain)
 #include "../grain_heat/grain_heat.h"
 #include "double_sum.h"
 #include "fix_heat_gran.h"
+#include "heat_walls.h"
 
 namespace LAMMPS_NS {
 
@@ -25,27 +26,31 @@ namespace LAMMPS_NS {
  *       [layer F] [minimum_gap S]
  *       [convection H T] [radiation EMISSIVITY T] [absolute_zero Z]
  *
- * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that integrates
- * Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows
- * into the group in the last step, W: convection, radiation. */
+ * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that
+ * integrates Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows into the group in the last step, W:
+ * convection, radiation, walls. */
 class FixHeatGranGrain : public FixHeatGran {
  public:
   FixHeatGranGrain(class LAMMPS *, int, char **);
   int setmask();
   void init();
   void setup_pre_force(int);
+  void initial_integrate(int);
   void post_integrate();
   void pre_force(int);
   void post_force(int);
+  void pre_final_integrate();
   double compute_vector(int);
 
  private:
-  enum Flow { CONVECTION, RADIATION, FLOWS };
+  enum Flow { CONVECTION, RADIATION, WALLS, FLOWS };
 
   GrainHeat model_;
   GrainSurface surface_;
   bool convection_, radiation_;
   DoubleSum flow_[FLOWS];            /* W, this rank's part */
+  HeatWalls walls_;
+  bool walls_found_;                 /* in this run */
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
   std::vector<double> built_;        /* positions when the neighbour list was built */
@@ -54,6 +59,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
+  void find_walls();
+  void keep_positions();
   void check_radiation(const class KeywordParser &) const;
   void exchange(int i, int j);
   void exchange_with_surroundings();

@@ -99,6 +99,11 @@ GrainHeat grain_heat_default(void);
 BaseStatus grain_heat_check(const GrainHeat *model);
 /* h of a pair, W/K. */
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
+/* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m; h = 0 for indirect models. The
+ * wall is the limit of a grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its
+ * surface. */
+double grain_heat_wall_conductance(const GrainHeat *model, double radius, const double conductivity[2],
+                                   double distance);
 /* Smallest gap between surfaces, m, from which on h = 0 for every pair of grains no larger than `radius`; 0 without an
  * indirect model. */
 double grain_heat_reach(const GrainHeat *model, double radius);

@@ -29,6 +29,7 @@ fix heat all heat/gran/grain initial_temperature 300 direct pipe area hertz &
 run             2
 """
 LAYER = "indirect layer fluid 0.026 layer 0.4 minimum_gap 1e-6"
+WALL = "fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.005 temperature 400\nrun 2"
 VORONOI = "indirect voronoi_b fluid 0.026 porosity 0.4 core 0.5 reach 0.5"
 
 
@@ -73,6 +74,12 @@ HEAT_CASES = [
          "another fix"),
     heat("twice_the_fix", "run             2", "fix too all heat/gran/grain initial_temperature 300 direct pipe\nrun 2",
          "another fix"),
+    heat("wall_without_direct", ("direct pipe area hertz", "run             2"), ("direct none", WALL), "'direct none'",
+         "fix wall/gran", "batchelor"),
+    heat("wall_below_zero", "run             2", WALL.replace("temperature 400", "temperature -20"), "fix floor", "-20",
+         ">= 0"),
+    heat("wall_contact_area", "run             2", WALL.replace("400", "400 contact_area projection"), "fix floor",
+         "'contact_area'", "overlap"),
     heat("convection_without_temperature", "reach 0.5", "reach 0.5 convection 10", "'convection'", "number"),
     heat("convection_negative", "reach 0.5", "reach 0.5 convection -1 300", "'convection'", "'-1'", ">= 0"),
     heat("convection_infinite", "reach 0.5", "reach 0.5 convection 10 inf", "'convection'", "'inf'", "finite"),

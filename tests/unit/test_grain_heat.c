@@ -393,6 +393,30 @@ static void surfaces_exchange_heat_by_newton_and_stefan_boltzmann(void **state) 
   AT_MOST(worst, 1e-14);
 }
 
+/* --------------------------------------------------------------------------------------------------- walls */
+static void a_wall_is_a_grain_of_infinite_radius(void **state) {
+  (void)state;
+  const double radius = 0.005, huge = 1e6 * radius, k[2] = {20.0, 90.0};
+  double worst = 0.0;
+  for (int n = 0; n < 40; n++) {
+    const double overlap = radius * ldexp(0.75, -(n % 8));
+    const GrainDirect direct = n & 1 ? GRAIN_DIRECT_BATCHELOR : GRAIN_DIRECT_LIGGGHTS;
+    const GrainHeat model =
+        make_model(direct, GRAIN_INDIRECT_NONE, n < 20 ? GRAIN_AREA_HERTZ : GRAIN_AREA_GEOMETRIC);
+    const double wall = grain_heat_wall_conductance(&model, radius, k, radius - overlap);
+    const GrainPair pair = {{radius, huge}, {k[0], k[1]}, radius + huge - overlap};
+    assert_true(wall > 0.0);
+    note(&worst, grain_heat_conductance(&model, &pair), wall);
+  }
+  AT_MOST(worst, 2e-6);
+  const GrainHeat pipe = make_model(GRAIN_DIRECT_PIPE, GRAIN_INDIRECT_NONE, GRAIN_AREA_GEOMETRIC);
+  worst = 0.0;
+  note(&worst, grain_heat_wall_conductance(&pipe, 5.0, k, 4.0), PI * 9.0 * 20.0 / 4.0);
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_heat_wall_conductance(&pipe, 5.0, k, 5.0) == 0.0);
+  assert_true(grain_heat_wall_conductance(&pipe, 5.0, (double[2]){20.0, 0.0}, 4.0) == 0.0);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(models_meet_the_reference_values),
@@ -403,6 +427,7 @@ int main(void) {
       cmocka_unit_test(nothing_conducts_beyond_the_reach),
       cmocka_unit_test(deep_overlaps_and_insulators_give_finite_values),
       cmocka_unit_test(wrong_models_are_refused),
+      cmocka_unit_test(a_wall_is_a_grain_of_infinite_radius),
       cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
