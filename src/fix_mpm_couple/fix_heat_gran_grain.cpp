@@ -34,6 +34,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
     : FixHeatGran(lammps, 5, BaseWords(arg).words),
       model_(grain_heat_default()),
       surface_{},
+      friction_(false),
       walls_(lammps),
       walls_found_(false),
       reach_(0.0) {
@@ -42,7 +43,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
   extvector = 1;
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
-                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero"});
+                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero", "friction"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe");
@@ -50,7 +51,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
   convection_ = parser.given("convection"), radiation_ = parser.given("radiation");
   check_radiation(parser);
   const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
-  if ((conducts || !(convection_ || radiation_)) && grain_heat_check(&model_) != BASE_OK)
+  if ((conducts || !(convection_ || radiation_ || friction_)) && grain_heat_check(&model_) != BASE_OK)
     parser.fail(base_error_message());
   force_reneighbor = model_.indirect != GRAIN_INDIRECT_NONE;
   next_reneighbor = -1;
@@ -76,6 +77,7 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
       surface_.emissivity = parser.number(NumberRange::between(0.0, 1.0));
       surface_.surroundings = parser.number(NumberRange::any());
     } else if (parser.is("absolute_zero")) surface_.absolute_zero = parser.number(NumberRange::any());
+    else if (parser.is("friction")) friction_ = parser.yes_no();
   }
 }
 
@@ -136,6 +138,7 @@ void FixHeatGranGrain::init() {
   }
   check_skin();
   FixHeatGran::init();
+  if (friction_) init_friction();
 }
 
 /* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
@@ -247,6 +250,7 @@ void FixHeatGranGrain::post_force(int) {
   updatePtrs();
   for (DoubleSum &flow : flow_) flow = DoubleSum();
   if (convection_ || radiation_) exchange_with_surroundings();
+  if (friction_) heat_by_friction();
   const NeighList *list = pair_gran->list;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];

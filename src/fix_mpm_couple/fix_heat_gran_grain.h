@@ -25,10 +25,11 @@ namespace LAMMPS_NS {
  *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
  *       [layer F] [minimum_gap S]
  *       [convection H T] [radiation EMISSIVITY T] [absolute_zero Z]
+ *       [friction yes|no]
  *
  * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that
- * integrates Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows into the group in the last step, W:
- * convection, radiation, walls. */
+ * integrates Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows into the group in the last step,
+ * W: convection, radiation, walls, friction. */
 class FixHeatGranGrain : public FixHeatGran {
  public:
   FixHeatGranGrain(class LAMMPS *, int, char **);
@@ -41,17 +42,20 @@ class FixHeatGranGrain : public FixHeatGran {
   void post_force(int);
   void pre_final_integrate();
   double compute_vector(int);
+  int n_history_extra() { return friction_ ? 3 : 0; }
+  bool history_args(char **);
 
  private:
-  enum Flow { CONVECTION, RADIATION, WALLS, FLOWS };
+  enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, FLOWS };
 
   GrainHeat model_;
   GrainSurface surface_;
-  bool convection_, radiation_;
+  bool convection_, radiation_, friction_;
   DoubleSum flow_[FLOWS];            /* W, this rank's part */
   HeatWalls walls_;
   bool walls_found_;                 /* in this run */
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
+  std::vector<double> stiffness_;    /* of the tangential springs by pair of types, N/m; with friction */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
   std::vector<double> built_;        /* positions when the neighbour list was built */
 
@@ -59,6 +63,9 @@ class FixHeatGranGrain : public FixHeatGran {
   void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
+  void init_friction();
+  void heat_by_friction();
+  void slip(int i, int j, double *history);
   void find_walls();
   void keep_positions();
   void check_radiation(const class KeywordParser &) const;

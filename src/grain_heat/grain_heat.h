@@ -108,6 +108,20 @@ double grain_heat_wall_conductance(const GrainHeat *model, double radius, const 
  * indirect model. */
 double grain_heat_reach(const GrainHeat *model, double radius);
 
+/* ---------------------------------------------------------------------------------------------------- slip */
+/* Two grains in contact as `pair_style gran ... tangential history` sees them in a step: radii in m, branch = x0 - x1
+ * in m, velocities in m/s, spins in 1/s. */
+typedef struct GrainMotion {
+  double radius[2], branch[3], velocity[2][3], spin[2][3];
+} GrainMotion;
+/* Work of friction in a step of duration `step`, J. The tangential spring, of the given stiffness (N/m), goes from
+ * `before` by the grains' motion to a trial state, which the Coulomb limit shortens to `after`, m: mean force times
+ * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not keep in
+ * the spring. (Negative only in a step in which the slip turns back by more than the spring is long.) With `before` and
+ * `after` negated the same for the grains in the other order. */
+double grain_slip_work(const GrainMotion *motion, double stiffness, double step, const double before[3],
+                       const double after[3]);
+
 /* ------------------------------------------------------------------------------------------------- surface */
 /* What a grain exchanges with its surroundings over its whole surface, 4 pi R^2. Temperatures on the scale of the
  * grains, whose absolute zero is at `absolute_zero` (0 for kelvin, -273.15 for degrees Celsius). */

@@ -31,6 +31,15 @@ run             2
 LAYER = "indirect layer fluid 0.026 layer 0.4 minimum_gap 1e-6"
 WALL = "fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.005 temperature 400\nrun 2"
 VORONOI = "indirect voronoi_b fluid 0.026 porosity 0.4 core 0.5 reach 0.5"
+STIFFNESS = """
+fix s1 all property/global kn peratomtypepair 1 1000
+fix s2 all property/global kt peratomtypepair 1 500
+fix s3 all property/global gamman peratomtypepair 1 1
+fix s4 all property/global gammat peratomtypepair 1 1
+fix s5 all property/global coefficientRollingFriction peratomtypepair 1 0.1
+pair_style      gran model hooke/stiffness tangential history"""
+SPRINGS = (("reach 0.5", "fix m4", "pair_style      gran model hertz tangential history"),
+           ("reach 0.5 friction yes", "fix m4", STIFFNESS))
 
 
 class HeatCase(Case):
@@ -74,6 +83,12 @@ HEAT_CASES = [
          "another fix"),
     heat("twice_the_fix", "run             2", "fix too all heat/gran/grain initial_temperature 300 direct pipe\nrun 2",
          "another fix"),
+    heat("friction_with_hertz", "reach 0.5", "reach 0.5 friction yes", "'friction'", "hooke/stiffness"),
+    heat("friction_with_rolling", SPRINGS[0], (*SPRINGS[1][:2], SPRINGS[1][2] + " rolling_friction epsd2"),
+         "'friction'", "rolling_friction"),
+    heat("friction_after_run", (*SPRINGS[0][:2], "fix heat", SPRINGS[0][2]),
+         (*SPRINGS[1][:2], "run 1\nfix heat", SPRINGS[1][2]), "'friction'", "before the first run"),
+    heat("friction_maybe", "reach 0.5", "reach 0.5 friction maybe", "'friction'", "'maybe'", "no or yes"),
     heat("wall_without_direct", ("direct pipe area hertz", "run             2"), ("direct none", WALL), "'direct none'",
          "fix wall/gran", "batchelor"),
     heat("wall_below_zero", "run             2", WALL.replace("temperature 400", "temperature -20"), "fix floor", "-20",

@@ -375,3 +375,120 @@ def test_flows_from_the_surroundings_add_up_to_the_energy(np, dempm):
     assert len(energy) == 51 and min(abs(f) for flow in flows for f in flow[1:]) > 0.0
     for n in range(1, 51):
         assert energy[n] - energy[n - 1] == pytest.approx(1e-3 * (flows[0][n] + flows[1][n]), abs=1e-12 * energy[0])
+
+
+# ---------------------------------------------------------------------------------------------------- friction
+SPRINGS = """
+neighbor 0.001 bin
+neigh_modify delay 0
+fix m1 all property/global kn peratomtypepair 2 4000 3000 3000 2000
+fix m2 all property/global kt peratomtypepair 2 2000 1500 1500 1000
+fix m3 all property/global gamman peratomtypepair 2 0 0 0 0
+fix m4 all property/global gammat peratomtypepair 2 0 0 0 0
+fix m5 all property/global coefficientFriction peratomtypepair 2 0.3 0.3 0.3 0.3
+fix k all property/global thermalConductivity peratomtype 20 90
+fix c all property/global thermalCapacity peratomtype 0.1 0.2
+pair_style gran model hooke/stiffness tangential history
+pair_coeff * *
+timestep {dt}
+fix heat all heat/gran/grain initial_temperature 300 direct none friction yes
+fix move all nve/sphere
+"""
+IMPACT = [(1, 0.005, 0.0150, 0.018, 0.01, 300.0), (2, 0.004, 0.0242, 0.02, 0.011, 300.0)]
+MOVING = """thermo 1
+thermo_style custom step atoms f_heat f_heat[4] ke
+thermo_modify format float %.17g
+dump end all custom {every} end.dump id type radius mass x y z vx vy vz omegax omegay omegaz f_Temp[0]
+dump_modify end sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g"
+"""
+
+
+def impact(dt, speed=0.4, duration=0.008):
+    """Two grains of different size and stiffness hit each other off centre, without damping."""
+    make, heat = grains(IMPACT)
+    push = f"velocity all set 0 0 0\\ngroup one id 1\\nvelocity one set {speed} 0.3 0.4\\n".replace("\\n", "\n")
+    steps = round(duration / dt)
+    return (box((0, 0, 0), (0.04, 0.04, 0.04), "f f f") + make + SPRINGS.format(dt=dt) + push + heat +
+            MOVING.format(every=steps) + f"run {steps}\n")
+
+
+def kinetic(frame):
+    """With spin."""
+    total = 0.0
+    for n, (m, r) in enumerate(zip(frame["mass"], frame["radius"])):
+        total += 0.5 * m * sum(frame["v" + a][n] ** 2 for a in "xyz")
+        total += 0.2 * m * r * r * sum(frame["omega" + a][n] ** 2 for a in "xyz")
+    return total
+
+
+def test_friction_turns_lost_energy_into_heat(dempm, tmp_path):
+    """Kinetic energy lost in the impact = heat gained, but for the error of the time integration; half to each."""
+    errors = []
+    for dt in (4e-6, 2e-6, 1e-6):
+        run = dempm(impact(dt), cwd=tmp_path / str(dt))
+        (_, first), (_, end) = run.dump("end.dump")
+        lost = kinetic(first) - kinetic(end)
+        gained = [m * c * (T - 300.0) for m, c, T in zip(end["mass"], (0.1, 0.2), end["f_Temp[0]"])]
+        assert lost > 0.01 * kinetic(first) and abs(end["omegaz"][0]) > 1.0
+        assert gained[0] == pytest.approx(gained[1], rel=1e-7)
+        assert dt * sum(run.table["f_heat[4]"][1:]) == pytest.approx(sum(gained), rel=1e-7)
+        errors.append(abs(sum(gained) / lost - 1))
+    print("energy closure", errors)
+    assert errors[2] < 1e-4 and errors[2] < 0.7 * errors[1] < 0.49 * errors[0]
+
+
+def sliding():
+    """As `impact`, with a restart file written in the middle of it."""
+    return impact(2e-6, duration=2.6e-3).replace("run 1300\n", "run 650\nwrite_restart half\nrun 650\n")
+
+
+def test_friction_is_the_same_on_two_ranks_and_after_a_restart(dempm, tmp_path):
+    one, two = (dempm(sliding(), np=np, cwd=tmp_path / str(np)) for np in (1, 2))
+    halves = one.thermo[-2:]
+    assert halves[0]["f_heat[4]"][-1] > 0.0 and halves[1]["f_heat[4]"][1] > 0.0  # it slides when the restart is written
+    assert halves[1]["f_heat[4]"] == pytest.approx(two.thermo[-1]["f_heat[4]"], rel=1e-9, abs=1e-12)
+    gains = [[T - 300 for T in last(run, "f_Temp[0]")] for run in (one, two)]
+    assert gains[1] == pytest.approx(gains[0], rel=1e-9)
+    again = dempm(HEAD.format(boundary="f f f") + f"read_restart {tmp_path}/1/half\n" + SPRINGS.format(dt=2e-6) +
+                  MOVING.format(every=650) + "run 650\n", cwd=tmp_path / "again")
+    for name in ("f_Temp[0]", "vx", "vz", "omegaz"):
+        assert last(again, name) == last(one, name)
+    assert again.table["f_heat[4]"][1:] == halves[1]["f_heat[4]"][1:]
+
+
+def gas(steps, size, rows):
+    """Grains that fly about in a periodic box and collide without damping."""
+    make, heat = grains(rows)
+    draw = random.Random(3).uniform
+    push = "".join(f"set atom {n} vx {draw(-1, 1)!r} vy {draw(-1, 1)!r} vz {draw(-1, 1)!r}\n"
+                   for n in range(1, len(rows) + 1))
+    output = MOVING.format(every=steps).replace("thermo 1\n", "thermo 100\n")
+    return (box((0, 0, 0), size, "p p p") + make + SPRINGS.format(dt=1e-6) + push + heat + output + f"run {steps}\n")
+
+
+def normal_springs(frame, size):
+    stiffness = {(1, 1): 4000.0, (1, 2): 3000.0, (2, 2): 2000.0}
+    grain = list(zip(*(frame[name] for name in ("x", "y", "z", "radius", "type"))))
+    total = 0.0
+    for n, a in enumerate(grain):
+        for b in grain[:n]:
+            apart = math.sqrt(sum(((p - q + 1.5 * L) % L - 0.5 * L) ** 2 for p, q, L in zip(a, b, size)))
+            overlap = a[3] + b[3] - apart
+            if overlap > 0.0:
+                total += 0.5 * stiffness[tuple(sorted((int(a[4]), int(b[4]))))] * overlap ** 2
+    return total
+
+
+def test_energy_of_many_colliding_grains_closes(dempm, tmp_path):
+    """Kinetic energy, that of normal springs and heat; the tangential springs of the last instant are left out."""
+    rows, size = packing(0.0125, 0.0002)
+    rows = [(*row[:5], 300.0) for row in rows]
+    runs = [dempm(gas(20000, size, rows), np=np, cwd=tmp_path / str(np)) for np in (1, 2)]
+    for run in runs:
+        (_, first), (_, end) = run.dump("end.dump")
+        capacity = [m * (0.1, 0.2)[int(t) - 1] for m, t in zip(end["mass"], end["type"])]
+        heat = math.fsum(c * (T - 300.0) for c, T in zip(capacity, end["f_Temp[0]"]))
+        mechanical = [kinetic(frame) + normal_springs(frame, size) for frame in (first, end)]
+        print("closure", heat / (mechanical[0] - mechanical[1]) - 1, "of", heat / mechanical[0])
+        assert heat > 0.1 * mechanical[0]
+        assert heat == pytest.approx(mechanical[0] - mechanical[1], rel=5e-3)

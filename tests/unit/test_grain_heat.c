@@ -370,6 +370,29 @@ static void wrong_models_are_refused(void **state) {
   assert_int_equal(grain_heat_check(&model), BASE_ERROR_ARGUMENT);
 }
 
+/* ---------------------------------------------------------------------------------------------------- slip */
+/* Grain 0 above grain 1; it moves along x at 2 m/s, and its spin takes 1 m/s of that off at the point of contact. */
+static void slip_work_is_force_times_slip(void **state) {
+  (void)state;
+  const double k = 1000.0, dt = 1e-5, before[3] = {3e-6, 0, 0}, after[3] = {4e-6, 0, 0}, same[3] = {1.3e-5, 0, 0};
+  const GrainMotion motion = {.radius = {0.5, 0.25},
+                              .branch = {0, 0, 0.75},
+                              .velocity = {{2, 0, 7}, {0, 0, 0}},
+                              .spin = {{0, 2, 5}, {0, 0, 0}}};
+  double worst = 0.0;
+  note(&worst, grain_slip_work(&motion, k, dt, before, after), k * 3.5e-6 * (3e-6 + 1e-5 - 4e-6));
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_slip_work(&motion, k, dt, before, same) == 0.0); /* the spring takes it all: no slip */
+  const GrainMotion other = {.radius = {0.25, 0.5},
+                             .branch = {0, 0, -0.75},
+                             .velocity = {{0, 0, 0}, {2, 0, 7}},
+                             .spin = {{0, 0, 0}, {0, 2, 5}}};
+  const double before2[3] = {-3e-6, 0, 0}, after2[3] = {-4e-6, 0, 0};
+  worst = 0.0;
+  note(&worst, grain_slip_work(&other, k, dt, before2, after2), grain_slip_work(&motion, k, dt, before, after));
+  AT_MOST(worst, 1e-14);
+}
+
 /* ------------------------------------------------------------------------------------------------- surface */
 static void surfaces_exchange_heat_by_newton_and_stefan_boltzmann(void **state) {
   (void)state;
@@ -428,6 +451,7 @@ int main(void) {
       cmocka_unit_test(deep_overlaps_and_insulators_give_finite_values),
       cmocka_unit_test(wrong_models_are_refused),
       cmocka_unit_test(a_wall_is_a_grain_of_infinite_radius),
+      cmocka_unit_test(slip_work_is_force_times_slip),
       cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
