@@ -138,7 +138,7 @@ void FixHeatGranGrain::init() {
   }
   check_skin();
   FixHeatGran::init();
-  if (friction_) init_friction();
+  init_friction();
 }
 
 /* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */

@@ -42,6 +42,7 @@ class FixHeatGranGrain : public FixHeatGran {
   void post_force(int);
   void pre_final_integrate();
   double compute_vector(int);
+  void pre_delete(bool);
   int n_history_extra() { return friction_ ? 3 : 0; }
   bool history_args(char **);
 

@@ -21,16 +21,26 @@ bool FixHeatGranGrain::history_args(char **args) {
   return true;
 }
 
+/* LIGGGHTS' history of contacts keeps the size that it had in the first run, but pair styles expect that of the fixes
+ * which are there: without this fix they would read beyond it. */
+void FixHeatGranGrain::pre_delete(bool unfix) {
+  if (unfix && friction_ && stiffness_.size() > 0)
+    fix_failed(lmp, this, "with 'friction yes' the fix cannot be removed after the first run");
+}
+
 void FixHeatGranGrain::init_friction() {
+  FixContactHistory *history = pair_gran->get_fix_history();
+  if (history && history->get_dnum() != pair_gran->dnum())
+    fix_failed(lmp, this,
+               "keyword 'friction' cannot change after the first run: define the fix before it; contacts that exist "
+               "have no record");
+  if (!friction_) return;
   /* The spring comes first in the history if nothing else of the pair style is in it. */
   if (!pair_gran->contact_match("normal", "hooke/stiffness") || !pair_gran->contact_match("tangential", "history") ||
       pair_gran->dnum_pair() != 3)
     fix_failed(lmp, this,
                "keyword 'friction': allowed is pair_style gran model hooke/stiffness tangential history, without "
                "models that have a history of their own (rolling_friction epsd..., cohesion with liquid)");
-  if (pair_gran->get_fix_history()->get_dnum() != pair_gran->dnum())
-    fix_failed(lmp, this,
-               "keyword 'friction': define the fix before the first run: contacts that exist have no record");
   const int types = atom->get_properties()->max_type();
   stiffness_.assign((types + 1) * (types + 1), 0.0);
   for (int a = 1; a <= types; a++)
