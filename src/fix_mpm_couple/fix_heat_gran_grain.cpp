@@ -46,7 +46,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
                         "layer", "minimum_gap", "convection", "radiation", "absolute_zero", "friction"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
-  parser.require("direct", "direct none|batchelor|liggghts|pipe");
+  parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
   check_keywords(parser);
   convection_ = parser.given("convection"), radiation_ = parser.given("radiation");
   check_radiation(parser);
@@ -60,7 +60,8 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
 void FixHeatGranGrain::read_model(KeywordParser &parser) {
   while (parser.next()) {
     if (parser.is("initial_temperature")) T0 = parser.number(NumberRange::any());
-    else if (parser.is("direct")) model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe"});
+    else if (parser.is("direct"))
+      model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe", "collisional"});
     else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
     else if (parser.is("indirect"))
       model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
@@ -106,7 +107,7 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   const struct {
     const char *keyword, *models;
     bool used;
-  } uses[] = {{"area", "'direct batchelor', 'liggghts' or 'pipe'", model_.direct != GRAIN_DIRECT_NONE},
+  } uses[] = {{"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
               {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
               {"porosity", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
               {"reach", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
@@ -138,7 +139,7 @@ void FixHeatGranGrain::init() {
   }
   check_skin();
   FixHeatGran::init();
-  init_friction();
+  init_history();
 }
 
 /* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
@@ -210,14 +211,14 @@ void FixHeatGranGrain::post_integrate() {
 }
 
 /* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
-void FixHeatGranGrain::exchange(int i, int j) {
+void FixHeatGranGrain::exchange(int i, int j, double *record) {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
   const int *type = atom->type;
   const GrainPair pair = {{atom->radius[i], atom->radius[j]},
                           {conductivity_[type[i]], conductivity_[type[j]]},
                           sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
-  const double conductance = grain_heat_conductance(&model_, &pair);
+  const double conductance = record ? collide(i, j, pair, record) : grain_heat_conductance(&model_, &pair);
   if (conductance == 0.0) return;
   const double flow = (Temp[j] - Temp[i]) * conductance;
   heatFlux[i] += flow;
@@ -252,11 +253,14 @@ void FixHeatGranGrain::post_force(int) {
   if (convection_ || radiation_) exchange_with_surroundings();
   if (friction_) heat_by_friction();
   const NeighList *list = pair_gran->list;
+  const int impact = collides() ? pair_gran->fix_extra_dnum_index(this) + (friction_ ? 3 : 0) : 0;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];
     for (int k = 0; k < list->numneigh[i]; k++) {
       const int j = list->firstneigh[i][k] & NEIGHMASK;
-      if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j);
+      double *record = NULL;
+      if (collides()) record = list->listgranhistory->firstdouble[i] + (size_t)pair_gran->dnum() * k + impact;
+      if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j, record);
     }
   }
 }

@@ -21,7 +21,7 @@ namespace LAMMPS_NS {
 
 /* Heat conduction between the particles of a group (pair_style gran), in place of LIGGGHTS' fix heat/gran/conduction.
  *
- *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe
+ *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe|collisional
  *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
  *       [layer F] [minimum_gap S]
  *       [convection H T] [radiation EMISSIVITY T] [absolute_zero Z]
@@ -43,7 +43,7 @@ class FixHeatGranGrain : public FixHeatGran {
   void pre_final_integrate();
   double compute_vector(int);
   void pre_delete(bool);
-  int n_history_extra() { return friction_ ? 3 : 0; }
+  int n_history_extra();
   bool history_args(char **);
 
  private:
@@ -57,6 +57,8 @@ class FixHeatGranGrain : public FixHeatGran {
   bool walls_found_;                 /* in this run */
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
   std::vector<double> stiffness_;    /* of the tangential springs by pair of types, N/m; with friction */
+  std::vector<double> capacity_;     /* J/(kg K), by atom type; with collisions */
+  std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
   std::vector<double> built_;        /* positions when the neighbour list was built */
 
@@ -64,13 +66,17 @@ class FixHeatGranGrain : public FixHeatGran {
   void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
+  bool collides() const { return model_.direct == GRAIN_DIRECT_COLLISIONAL; }
+  void init_history();
   void init_friction();
+  void init_collisions();
+  double collide(int i, int j, const GrainPair &pair, double *record) const;
   void heat_by_friction();
   void slip(int i, int j, double *history);
   void find_walls();
   void keep_positions();
   void check_radiation(const class KeywordParser &) const;
-  void exchange(int i, int j);
+  void exchange(int i, int j, double *record);
   void exchange_with_surroundings();
 };
 

@@ -29,6 +29,7 @@ BaseStatus grain_heat_check(const GrainHeat *model) {
 
 static double conduct_directly(const GrainHeat *model, const GrainPair *pair, double radius) {
   switch (model->direct) {
+    case GRAIN_DIRECT_COLLISIONAL:
     case GRAIN_DIRECT_BATCHELOR: return grain_direct_batchelor(pair, radius);
     case GRAIN_DIRECT_LIGGGHTS: return grain_direct_liggghts(pair, radius);
     case GRAIN_DIRECT_PIPE: return grain_direct_pipe(pair, radius);
@@ -64,6 +65,14 @@ static double conduct_through_fluid(const GrainHeat *model, const GrainPair *pai
 
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair) {
   return conduct_in_contact(model, pair) + conduct_through_fluid(model, pair);
+}
+
+double grain_heat_impact_conductance(const GrainHeat *model, const GrainPair *pair, const GrainImpact *impact,
+                                     double age, double step) {
+  const double share = fmin(fmax((impact->duration - age) / step, 0.0), 1.0);
+  if (share == 0.0 || grain_impact_fourier(pair, impact) > 5.0) return grain_heat_conductance(model, pair);
+  return share * grain_direct_collisional(pair, impact) + (1.0 - share) * conduct_in_contact(model, pair) +
+         conduct_through_fluid(model, pair);
 }
 
 double grain_heat_reach(const GrainHeat *model, double radius) {

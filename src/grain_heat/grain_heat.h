@@ -47,8 +47,11 @@ typedef struct GrainImpact {
  * 1/E* = (1 - nu0^2)/E0 + (1 - nu1^2)/E1 in Pa, speed of approach m/s, all > 0. */
 void grain_impact_hertz(const GrainPair *pair, const double mass[2], double stiffness, double speed, double *radius_max,
                         double *duration);
+/* Fourier number of the impact, of the grain that the collisional model takes it of. */
+double grain_impact_fourier(const GrainPair *pair, const GrainImpact *impact);
 /* Collisional (table 1, corrected: C2 = ... + 24.885, the ratio of heat capacities not squared and at most 1): mean
- * over the impact. The published fit; accurate to some per cent for Fourier numbers below 0.1 only. */
+ * over the impact. The published fit; accurate to some per cent for Fourier numbers below 0.1 only, not-a-number
+ * above some 16 for unequal capacities. */
 double grain_direct_collisional(const GrainPair *pair, const GrainImpact *impact);
 
 /* ------------------------------------------------------------------------------------------------ indirect */
@@ -72,7 +75,8 @@ typedef enum GrainDirect {
   GRAIN_DIRECT_NONE,
   GRAIN_DIRECT_BATCHELOR,
   GRAIN_DIRECT_LIGGGHTS,
-  GRAIN_DIRECT_PIPE
+  GRAIN_DIRECT_PIPE,
+  GRAIN_DIRECT_COLLISIONAL /* after the impact: Batchelor and O'Brien, as at walls */
 } GrainDirect;
 typedef enum GrainIndirect {
   GRAIN_INDIRECT_NONE,
@@ -97,8 +101,13 @@ typedef struct GrainHeat {
 /* Nothing conducts; porosity 0.4, core 0.5, layer 0.4, minimum_gap 2.75e-8 m, reach 0.5; no fluid. */
 GrainHeat grain_heat_default(void);
 BaseStatus grain_heat_check(const GrainHeat *model);
-/* h of a pair, W/K. */
+/* h of a pair, W/K; of the collisional model the value after the impact. */
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
+/* h of a pair in contact for a step that begins at `age` (s) of the impact, W/K: for the part of the step before
+ * impact->duration has passed the collisional mean takes the place of the direct model; not at Fourier numbers above
+ * 5, where the published fit ends and conduction is nearly steady. */
+double grain_heat_impact_conductance(const GrainHeat *model, const GrainPair *pair, const GrainImpact *impact,
+                                     double age, double step);
 /* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m; h = 0 for indirect models. The
  * wall is the limit of a grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its
  * surface. */
@@ -116,9 +125,9 @@ typedef struct GrainMotion {
 } GrainMotion;
 /* Work of friction in a step of duration `step`, J. The tangential spring, of the given stiffness (N/m), goes from
  * `before` by the grains' motion to a trial state, which the Coulomb limit shortens to `after`, m: mean force times
- * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not keep in
- * the spring. (Negative only in a step in which the slip turns back by more than the spring is long.) With `before` and
- * `after` negated the same for the grains in the other order. */
+ * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not
+ * keep the spring. (Negative only in a step in which the slip turns back by more than the spring is long.) With
+ * `before` and `after` negated the same for the grains in the other order. */
 double grain_slip_work(const GrainMotion *motion, double stiffness, double step, const double before[3],
                        const double after[3]);
 

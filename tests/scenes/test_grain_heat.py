@@ -492,3 +492,56 @@ def test_energy_of_many_colliding_grains_closes(dempm, tmp_path):
         print("closure", heat / (mechanical[0] - mechanical[1]) - 1, "of", heat / mechanical[0])
         assert heat > 0.1 * mechanical[0]
         assert heat == pytest.approx(mechanical[0] - mechanical[1], rel=5e-3)
+
+
+# -------------------------------------------------------------------------------------------------- collisions
+def bounce(dt, duration=6e-3):
+    """Two grains of different size and type hit each other head on; LIGGGHTS' Hertz without damping, E = 5e6."""
+    rows = [(1, 0.005, 0.0148, 0.01, 0.01, 350.0), (2, 0.004, 0.0240, 0.01, 0.01, 250.0)]
+    make, heat = grains(rows)
+    steps = round(duration / dt)
+    return (box((0, 0, 0), (0.04, 0.02, 0.02), "f f f") + make +
+            PROPERTIES.format(skin=0.001).replace("2e-5", repr(dt)).replace("0.5 0.5 0.5 0.5", "0.999999 0.999999 0.999999 0.999999")
+            .replace("0.1 0.2", "100 200") +
+            "fix heat all heat/gran/grain initial_temperature 300 direct collisional\nfix move all nve/sphere\n"
+            "velocity all set 0 0 0\ngroup one id 1\nvelocity one set 0.2 0 0\n" + heat +
+            MOVING.replace("f_heat[4] ", "").format(every=steps) + f"run {steps}\n")
+
+
+def collisional(masses, speed):
+    """Table 1, corrected, in the order of heat capacities per volume that the formula wants."""
+    radii, k, density = (0.005, 0.004), (20.0, 90.0), 2500.0
+    per_volume = [density * c for c in (100.0, 200.0)]
+    m, r = (a * b / (a + b) for a, b in (masses, radii))
+    stiffness = 5e6 / (2 * (1 - 0.09))
+    widest = (15 * m * r * r * speed ** 2 / (16 * stiffness)) ** 0.2
+    duration = 2.8683 * (m * m / (r * stiffness ** 2 * speed)) ** 0.2
+    ratio, fourier = per_volume[0] / per_volume[1], k[0] * duration / (per_volume[0] * widest ** 2)
+    c1, c2, c3 = (-2.3 * ratio ** 2 + 8.909 * ratio - 4.235, 8.169 * ratio ** 2 - 33.77 * ratio + 24.885,
+                  -5.758 * ratio ** 2 + 24.464 * ratio - 20.511)
+    factor = 0.435 / c1 * (math.sqrt(c2 * c2 - 4 * c1 * (c3 - fourier)) - c2)
+    resistance = sum((c * conductivity) ** -0.5 for c, conductivity in zip(per_volume, k))
+    return factor * math.pi * widest ** 2 / math.sqrt(duration) / resistance, duration
+
+
+def test_an_impact_exchanges_the_collisional_heat(dempm, tmp_path):
+    runs = [dempm(bounce(2e-6), np=np, cwd=tmp_path / str(np)) for np in (1, 2)]
+    masses, (one, two) = last(runs[0], "mass"), last(runs[0], "f_Temp[0]")
+    assert last(runs[0], "vx")[0] < last(runs[0], "vx")[1]  # they have parted
+    h, duration = collisional(masses, 0.2)
+    rate = h * sum(1 / (c * m) for c, m in zip((100.0, 200.0), masses))
+    print("collisional heat", (100.0 - (one - two)) / (-100.0 * math.expm1(-rate * duration)) - 1)
+    assert 100.0 - (one - two) == pytest.approx(-100.0 * math.expm1(-rate * duration), rel=5e-3)
+    heat_of_one, heat_of_two = 100.0 * masses[0] * (one - 350.0), 200.0 * masses[1] * (two - 250.0)
+    assert heat_of_one == pytest.approx(-heat_of_two, rel=1e-9)
+    assert last(runs[1], "f_Temp[0]") == pytest.approx([one, two], rel=1e-12)
+
+
+def test_friction_and_collisions_keep_separate_records(dempm, tmp_path):
+    both = impact(2e-6).replace("fix heat all", "fix y all property/global youngsModulus peratomtype 5e6 5e6\n"
+                                "fix p all property/global poissonsRatio peratomtype 0.3 0.3\nfix heat all")
+    runs = [dempm(script, cwd=tmp_path / str(n))
+            for n, script in enumerate((impact(2e-6), both.replace("direct none", "direct collisional")))]
+    work = [sum(run.table["f_heat[4]"]) for run in runs]
+    assert work[0] > 0.0 and work[1] == work[0]
+    assert last(runs[0], "omegaz") == last(runs[1], "omegaz")

@@ -370,6 +370,26 @@ static void wrong_models_are_refused(void **state) {
   assert_int_equal(grain_heat_check(&model), BASE_ERROR_ARGUMENT);
 }
 
+static void impacts_end_in_steady_conduction(void **state) {
+  (void)state;
+  const GrainHeat model = make_model(GRAIN_DIRECT_COLLISIONAL, GRAIN_INDIRECT_NONE, GRAIN_AREA_GEOMETRIC);
+  const GrainPair pair = {.radius = {1, 2}, .conductivity = {1, 5}, .distance = 2.9};
+  GrainImpact impact = {.radius_max = 0.1, .duration = 1e-3, .heat_capacity = {1, 3}};
+  const double steady = grain_heat_conductance(&model, &pair), mean = grain_direct_collisional(&pair, &impact);
+  assert_true(mean > 0.0 && steady == grain_direct_batchelor(&pair, grain_radius_geometric(&pair)));
+  double worst = 0.0;
+  note(&worst, grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 2e-4), mean);
+  note(&worst, grain_heat_impact_conductance(&model, &pair, &impact, 9.5e-4, 2e-4), 0.25 * mean + 0.75 * steady);
+  note(&worst, grain_heat_impact_conductance(&model, &pair, &impact, 1e-3, 2e-4), steady);
+  AT_MOST(worst, 1e-12);
+  const GrainPair other = {.radius = {2, 1}, .conductivity = {5, 1}, .distance = 2.9};
+  const GrainImpact turned = {.radius_max = 0.1, .duration = 1e-3, .heat_capacity = {3, 1}};
+  assert_true(grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 1e-4) ==
+              grain_heat_impact_conductance(&model, &other, &turned, 0.0, 1e-4));
+  impact.duration = 1.0; /* Fourier number 100: the fit has no value */
+  assert_true(grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 1e-4) == steady);
+}
+
 /* ---------------------------------------------------------------------------------------------------- slip */
 /* Grain 0 above grain 1; it moves along x at 2 m/s, and its spin takes 1 m/s of that off at the point of contact. */
 static void slip_work_is_force_times_slip(void **state) {
@@ -451,6 +471,7 @@ int main(void) {
       cmocka_unit_test(deep_overlaps_and_insulators_give_finite_values),
       cmocka_unit_test(wrong_models_are_refused),
       cmocka_unit_test(a_wall_is_a_grain_of_infinite_radius),
+      cmocka_unit_test(impacts_end_in_steady_conduction),
       cmocka_unit_test(slip_work_is_force_times_slip),
       cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
   };
