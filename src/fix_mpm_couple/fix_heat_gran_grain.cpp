@@ -2,8 +2,10 @@
 #include "fix_heat_gran_grain.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "atom.h"
+#include "comm.h"
 #include "fix_property_atom.h"
 #include "force.h"
 #include "keyword_parser.h"
@@ -29,15 +31,28 @@ struct BaseWords {
 }  // namespace
 
 FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
-    : FixHeatGran(lammps, 5, BaseWords(arg).words), model_(grain_heat_default()), reach_(0.0) {
+    : FixHeatGran(lammps, 5, BaseWords(arg).words),
+      model_(grain_heat_default()),
+      surface_{},
+      friction_(false),
+      walls_(lammps),
+      walls_found_(false),
+      reach_(0.0) {
+  vector_flag = 1;
+  size_vector = FLOWS;
+  extvector = 1;
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
-                        "layer", "minimum_gap"});
+                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero", "friction"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
-  parser.require("direct", "direct none|batchelor|liggghts|pipe");
+  parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
   check_keywords(parser);
-  if (grain_heat_check(&model_) != BASE_OK) parser.fail(base_error_message());
+  convection_ = parser.given("convection"), radiation_ = parser.given("radiation");
+  check_radiation(parser);
+  const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
+  if ((conducts || !(convection_ || radiation_ || friction_)) && grain_heat_check(&model_) != BASE_OK)
+    parser.fail(base_error_message());
   force_reneighbor = model_.indirect != GRAIN_INDIRECT_NONE;
   next_reneighbor = -1;
 }
@@ -45,7 +60,8 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
 void FixHeatGranGrain::read_model(KeywordParser &parser) {
   while (parser.next()) {
     if (parser.is("initial_temperature")) T0 = parser.number(NumberRange::any());
-    else if (parser.is("direct")) model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe"});
+    else if (parser.is("direct"))
+      model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe", "collisional"});
     else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
     else if (parser.is("indirect"))
       model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
@@ -55,7 +71,34 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("reach")) model_.reach = parser.number(NumberRange::positive());
     else if (parser.is("layer")) model_.layer = parser.number(NumberRange::positive());
     else if (parser.is("minimum_gap")) model_.minimum_gap = parser.number(NumberRange::positive());
+    else if (parser.is("convection")) {
+      surface_.coefficient = parser.number(NumberRange::at_least(0.0));
+      surface_.fluid_temperature = parser.number(NumberRange::any());
+    } else if (parser.is("radiation")) {
+      surface_.emissivity = parser.number(NumberRange::between(0.0, 1.0));
+      surface_.surroundings = parser.number(NumberRange::any());
+    } else if (parser.is("absolute_zero")) surface_.absolute_zero = parser.number(NumberRange::any());
+    else if (parser.is("friction")) friction_ = parser.yes_no();
   }
+}
+
+/* Fourth powers mean nothing but on an absolute scale. */
+void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
+  if (!radiation_) {
+    if (parser.given("absolute_zero")) parser.fail("keyword 'absolute_zero' has a meaning with 'radiation' only");
+    return;
+  }
+  if (strcmp(update->unit_style, "si") != 0)
+    parser.fail(std::string("keyword 'radiation' needs 'units si', not ") + update->unit_style);
+  const struct {
+    const char *keyword;
+    double temperature;
+  } checks[] = {{"radiation", surface_.surroundings}, {"initial_temperature", T0}};
+  for (const auto &check : checks)
+    if (check.temperature < surface_.absolute_zero)
+      parser.fail(format_text("keyword '%s': the temperature is %g, allowed is a number >= %g; keyword 'absolute_zero' "
+                              "names the absolute zero of another scale",
+                              check.keyword, check.temperature, surface_.absolute_zero));
 }
 
 /* A keyword that the model does not use is a mistake in the script. */
@@ -64,7 +107,7 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   const struct {
     const char *keyword, *models;
     bool used;
-  } uses[] = {{"area", "'direct batchelor', 'liggghts' or 'pipe'", model_.direct != GRAIN_DIRECT_NONE},
+  } uses[] = {{"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
               {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
               {"porosity", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
               {"reach", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
@@ -78,8 +121,9 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
 }
 
 int FixHeatGranGrain::setmask() {
-  const int neighbours = model_.indirect == GRAIN_INDIRECT_NONE ? 0 : FixConst::POST_INTEGRATE | FixConst::PRE_FORCE;
-  return FixHeatGran::setmask() | FixConst::POST_FORCE | neighbours;
+  const int neighbours = model_.indirect == GRAIN_INDIRECT_NONE ? 0 : FixConst::POST_INTEGRATE;
+  return FixHeatGran::setmask() | FixConst::PRE_FORCE | FixConst::POST_FORCE | FixConst::PRE_FINAL_INTEGRATE |
+         neighbours;
 }
 
 void FixHeatGranGrain::init() {
@@ -95,6 +139,7 @@ void FixHeatGranGrain::init() {
   }
   check_skin();
   FixHeatGran::init();
+  init_history();
 }
 
 /* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
@@ -124,13 +169,32 @@ void FixHeatGranGrain::check_skin() {
 }
 
 void FixHeatGranGrain::setup_pre_force(int) {
+  keep_positions();
+  walls_found_ = false;
+}
+
+void FixHeatGranGrain::initial_integrate(int vflag) {
+  FixHeatGran::initial_integrate(vflag);
+  if (!walls_found_) find_walls();
+}
+
+void FixHeatGranGrain::find_walls() {
+  walls_.take_over(this);
+  walls_found_ = true;
+  if (model_.direct == GRAIN_DIRECT_NONE && !walls_.empty())
+    fix_failed(lmp, this,
+               "'direct none': a wall (fix wall/gran) has a temperature, but only a direct model conducts at walls; "
+               "allowed are batchelor, liggghts and pipe");
+}
+
+void FixHeatGranGrain::keep_positions() {
   if (model_.indirect == GRAIN_INDIRECT_NONE) return;
   built_.resize(3 * (size_t)atom->nlocal);
   for (size_t k = 0; k < built_.size(); k++) built_[k] = atom->x[k / 3][k % 3];
 }
 
-void FixHeatGranGrain::pre_force(int vflag) {
-  if (neighbor->ago == 0) setup_pre_force(vflag);
+void FixHeatGranGrain::pre_force(int) {
+  if (neighbor->ago == 0) keep_positions();
 }
 
 /* LIGGGHTS builds the list anew when a grain has moved by half the skin, which is early enough for contacts. Pairs
@@ -147,14 +211,14 @@ void FixHeatGranGrain::post_integrate() {
 }
 
 /* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
-void FixHeatGranGrain::exchange(int i, int j) {
+void FixHeatGranGrain::exchange(int i, int j, double *record) {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
   const int *type = atom->type;
   const GrainPair pair = {{atom->radius[i], atom->radius[j]},
                           {conductivity_[type[i]], conductivity_[type[j]]},
                           sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
-  const double conductance = grain_heat_conductance(&model_, &pair);
+  const double conductance = record ? collide(i, j, pair, record) : grain_heat_conductance(&model_, &pair);
   if (conductance == 0.0) return;
   const double flow = (Temp[j] - Temp[i]) * conductance;
   heatFlux[i] += flow;
@@ -165,14 +229,52 @@ void FixHeatGranGrain::exchange(int i, int j) {
   }
 }
 
+void FixHeatGranGrain::exchange_with_surroundings() {
+  for (int i = 0; i < atom->nlocal; i++) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    double flows[FLOWS] = {};
+    if (convection_) flows[CONVECTION] = grain_convection(&surface_, atom->radius[i], Temp[i]);
+    if (radiation_) flows[RADIATION] = grain_radiation(&surface_, atom->radius[i], Temp[i]);
+    for (int k = 0; k < FLOWS; k++) heatFlux[i] += flows[k], flow_[k].add(flows[k]);
+  }
+}
+
+double FixHeatGranGrain::compute_vector(int n) {
+  std::vector<DoubleSum> parts(comm->nprocs);
+  MPI_Allgather(&flow_[n], sizeof flow_[n], MPI_BYTE, parts.data(), sizeof flow_[n], MPI_BYTE, world);
+  DoubleSum sum;
+  for (const DoubleSum &part : parts) sum.add(part);
+  return sum.value();
+}
+
 void FixHeatGranGrain::post_force(int) {
   updatePtrs();
+  for (DoubleSum &flow : flow_) flow = DoubleSum();
+  if (convection_ || radiation_) exchange_with_surroundings();
+  if (friction_) heat_by_friction();
   const NeighList *list = pair_gran->list;
+  const int impact = collides() ? pair_gran->fix_extra_dnum_index(this) + (friction_ ? 3 : 0) : 0;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];
     for (int k = 0; k < list->numneigh[i]; k++) {
       const int j = list->firstneigh[i][k] & NEIGHMASK;
-      if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j);
+      double *record = NULL;
+      if (collides()) record = list->listgranhistory->firstdouble[i] + (size_t)pair_gran->dnum() * k + impact;
+      if (atom->mask[i] & atom->mask[j] & groupbit) exchange(i, j, record);
     }
+  }
+}
+
+/* Here and not in post_force(): walls may come after this fix. */
+void FixHeatGranGrain::pre_final_integrate() {
+  updatePtrs();
+  for (const WallContact &contact : walls_.find_contacts()) {
+    const int i = contact.grain;
+    if (!(atom->mask[i] & groupbit)) continue;
+    const double k[2] = {conductivity_[atom->type[i]], conductivity_[contact.type]};
+    const double h = grain_heat_wall_conductance(&model_, atom->radius[i], k, contact.distance);
+    const double flow = h * (contact.temperature - Temp[i]);
+    heatFlux[i] += flow;
+    flow_[WALLS].add(flow);
   }
 }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "material_properties.h"
 
+#include <algorithm>
+
 #include "fix_property_global.h"
 #include "modify.h"
 #include "rank_error.h"
@@ -46,11 +48,11 @@ double MaterialProperties::of_type(const char *name, const NumberRange &range) c
   return checked(name, property->compute_vector(type_ - 1), range);
 }
 
-double MaterialProperties::of_pair(const char *name, const NumberRange &range) const {
+double MaterialProperties::of_pair(const char *name, const NumberRange &range, int other) const {
   FixPropertyGlobal *property = require(name, "peratomtypepair", "NTYPES VALUE [NTYPES x NTYPES values]");
-  if (property->size_array_rows < type_ || property->size_array_cols < type_)
+  if (property->size_array_rows < type_ || property->size_array_cols < std::max(type_, other))
     fix_failed(lmp, fix_,
                format_text("property '%s' is a %d x %d table, but there is atom type %d", name,
-                           property->size_array_rows, property->size_array_cols, type_));
-  return checked(name, property->compute_array(type_ - 1, type_ - 1), range);
+                           property->size_array_rows, property->size_array_cols, std::max(type_, other)));
+  return checked(name, property->compute_array(type_ - 1, other - 1), range);
 }

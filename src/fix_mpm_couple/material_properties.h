@@ -16,10 +16,11 @@ class MaterialProperties : protected Pointers {
   MaterialProperties(LAMMPS *lammps, const Fix *fix, int type) : Pointers(lammps), fix_(fix), type_(type) {}
 
   bool has(const char *name) const { return find(name) != NULL; }
-  /* `peratomtype` and `peratomtypepair` (type with itself). Ends the program, naming the property and the line that
+  /* `peratomtype` and `peratomtypepair` (type with itself, or with type `other`). Ends the program, naming the property and the line that
    * defines it, if it is missing, of another kind, too short for the type or outside `range`. Called on all ranks. */
   double of_type(const char *name, const NumberRange &range) const;
-  double of_pair(const char *name, const NumberRange &range) const;
+  double of_pair(const char *name, const NumberRange &range) const { return of_pair(name, range, type_); }
+  double of_pair(const char *name, const NumberRange &range, int other) const;
 
  private:
   const Fix *fix_;

@@ -62,12 +62,23 @@ static double find_collision_factor(double ratio, double fourier) {
   return c2 > 0.0 ? 1.74 * (fourier - c3) / (c2 + root) : 0.435 / c1 * (root - c2);
 }
 
+/* The grain that holds less heat sets the Fourier number; of two that hold the same, the one that conducts less. */
+static int find_first(const GrainPair *pair, const GrainImpact *impact) {
+  const double *capacity = impact->heat_capacity, *k = pair->conductivity;
+  return capacity[0] < capacity[1] || (capacity[0] == capacity[1] && k[0] <= k[1]) ? 0 : 1;
+}
+
+double grain_impact_fourier(const GrainPair *pair, const GrainImpact *impact) {
+  const int first = find_first(pair, impact);
+  const double square = impact->radius_max * impact->radius_max;
+  return pair->conductivity[first] * impact->duration / (impact->heat_capacity[first] * square);
+}
+
 double grain_direct_collisional(const GrainPair *pair, const GrainImpact *impact) {
   const double *capacity = impact->heat_capacity, *k = pair->conductivity, radius = impact->radius_max;
   if (!(k[0] > 0.0 && k[1] > 0.0)) return 0.0;
-  /* The grain that holds less heat sets the Fourier number; of two that hold the same, the one that conducts less. */
-  const int first = capacity[0] < capacity[1] || (capacity[0] == capacity[1] && k[0] <= k[1]) ? 0 : 1;
-  const double fourier = k[first] * impact->duration / (capacity[first] * radius * radius);
+  const int first = find_first(pair, impact);
+  const double fourier = grain_impact_fourier(pair, impact);
   const double factor = find_collision_factor(capacity[first] / capacity[1 - first], fourier);
   const double resistance = 1.0 / sqrt(capacity[0] * k[0]) + 1.0 / sqrt(capacity[1] * k[1]);
   return factor * PI * radius * radius / (sqrt(impact->duration) * resistance);

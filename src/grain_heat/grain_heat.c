@@ -27,16 +27,29 @@ BaseStatus grain_heat_check(const GrainHeat *model) {
   return BASE_OK;
 }
 
-static double conduct_directly(const GrainHeat *model, const GrainPair *pair) {
-  if (pair->distance >= pair->radius[0] + pair->radius[1]) return 0.0;
-  const double radius = model->area == GRAIN_AREA_HERTZ ? grain_radius_hertz(pair) : grain_radius_geometric(pair);
+static double conduct_directly(const GrainHeat *model, const GrainPair *pair, double radius) {
   switch (model->direct) {
+    case GRAIN_DIRECT_COLLISIONAL:
     case GRAIN_DIRECT_BATCHELOR: return grain_direct_batchelor(pair, radius);
     case GRAIN_DIRECT_LIGGGHTS: return grain_direct_liggghts(pair, radius);
     case GRAIN_DIRECT_PIPE: return grain_direct_pipe(pair, radius);
     case GRAIN_DIRECT_NONE: break;
   }
   return 0.0;
+}
+
+static double conduct_in_contact(const GrainHeat *model, const GrainPair *pair) {
+  if (pair->distance >= pair->radius[0] + pair->radius[1]) return 0.0;
+  const double radius = model->area == GRAIN_AREA_HERTZ ? grain_radius_hertz(pair) : grain_radius_geometric(pair);
+  return conduct_directly(model, pair, radius);
+}
+
+double grain_heat_wall_conductance(const GrainHeat *model, double radius, const double conductivity[2],
+                                   double distance) {
+  if (distance >= radius) return 0.0;
+  const GrainPair pair = {{radius, 0.0}, {conductivity[0], conductivity[1]}, distance};
+  const double width = model->area == GRAIN_AREA_HERTZ ? radius : radius + distance;
+  return conduct_directly(model, &pair, sqrt(width * (radius - distance)));
 }
 
 static double conduct_through_fluid(const GrainHeat *model, const GrainPair *pair) {
@@ -51,7 +64,15 @@ static double conduct_through_fluid(const GrainHeat *model, const GrainPair *pai
 }
 
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair) {
-  return conduct_directly(model, pair) + conduct_through_fluid(model, pair);
+  return conduct_in_contact(model, pair) + conduct_through_fluid(model, pair);
+}
+
+double grain_heat_impact_conductance(const GrainHeat *model, const GrainPair *pair, const GrainImpact *impact,
+                                     double age, double step) {
+  const double share = fmin(fmax((impact->duration - age) / step, 0.0), 1.0);
+  if (share == 0.0 || grain_impact_fourier(pair, impact) > 5.0) return grain_heat_conductance(model, pair);
+  return share * grain_direct_collisional(pair, impact) + (1.0 - share) * conduct_in_contact(model, pair) +
+         conduct_through_fluid(model, pair);
 }
 
 double grain_heat_reach(const GrainHeat *model, double radius) {

@@ -47,8 +47,11 @@ typedef struct GrainImpact {
  * 1/E* = (1 - nu0^2)/E0 + (1 - nu1^2)/E1 in Pa, speed of approach m/s, all > 0. */
 void grain_impact_hertz(const GrainPair *pair, const double mass[2], double stiffness, double speed, double *radius_max,
                         double *duration);
+/* Fourier number of the impact, of the grain that the collisional model takes it of. */
+double grain_impact_fourier(const GrainPair *pair, const GrainImpact *impact);
 /* Collisional (table 1, corrected: C2 = ... + 24.885, the ratio of heat capacities not squared and at most 1): mean
- * over the impact. The published fit; accurate to some per cent for Fourier numbers below 0.1 only. */
+ * over the impact. The published fit; accurate to some per cent for Fourier numbers below 0.1 only, not-a-number
+ * above some 16 for unequal capacities. */
 double grain_direct_collisional(const GrainPair *pair, const GrainImpact *impact);
 
 /* ------------------------------------------------------------------------------------------------ indirect */
@@ -72,7 +75,8 @@ typedef enum GrainDirect {
   GRAIN_DIRECT_NONE,
   GRAIN_DIRECT_BATCHELOR,
   GRAIN_DIRECT_LIGGGHTS,
-  GRAIN_DIRECT_PIPE
+  GRAIN_DIRECT_PIPE,
+  GRAIN_DIRECT_COLLISIONAL /* after the impact: Batchelor and O'Brien, as at walls */
 } GrainDirect;
 typedef enum GrainIndirect {
   GRAIN_INDIRECT_NONE,
@@ -97,11 +101,49 @@ typedef struct GrainHeat {
 /* Nothing conducts; porosity 0.4, core 0.5, layer 0.4, minimum_gap 2.75e-8 m, reach 0.5; no fluid. */
 GrainHeat grain_heat_default(void);
 BaseStatus grain_heat_check(const GrainHeat *model);
-/* h of a pair, W/K. */
+/* h of a pair, W/K; of the collisional model the value after the impact. */
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
+/* h of a pair in contact for a step that begins at `age` (s) of the impact, W/K: for the part of the step before
+ * impact->duration has passed the collisional mean takes the place of the direct model; not at Fourier numbers above
+ * 5, where the published fit ends and conduction is nearly steady. */
+double grain_heat_impact_conductance(const GrainHeat *model, const GrainPair *pair, const GrainImpact *impact,
+                                     double age, double step);
+/* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m; h = 0 for indirect models. The
+ * wall is the limit of a grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its
+ * surface. */
+double grain_heat_wall_conductance(const GrainHeat *model, double radius, const double conductivity[2],
+                                   double distance);
 /* Smallest gap between surfaces, m, from which on h = 0 for every pair of grains no larger than `radius`; 0 without an
  * indirect model. */
 double grain_heat_reach(const GrainHeat *model, double radius);
+
+/* ---------------------------------------------------------------------------------------------------- slip */
+/* Two grains in contact as `pair_style gran ... tangential history` sees them in a step: radii in m, branch = x0 - x1
+ * in m, velocities in m/s, spins in 1/s. */
+typedef struct GrainMotion {
+  double radius[2], branch[3], velocity[2][3], spin[2][3];
+} GrainMotion;
+/* Work of friction in a step of duration `step`, J. The tangential spring, of the given stiffness (N/m), goes from
+ * `before` by the grains' motion to a trial state, which the Coulomb limit shortens to `after`, m: mean force times
+ * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not
+ * keep the spring. (Negative only in a step in which the slip turns back by more than the spring is long.) With
+ * `before` and `after` negated the same for the grains in the other order. */
+double grain_slip_work(const GrainMotion *motion, double stiffness, double step, const double before[3],
+                       const double after[3]);
+
+/* ------------------------------------------------------------------------------------------------- surface */
+/* What a grain exchanges with its surroundings over its whole surface, 4 pi R^2. Temperatures on the scale of the
+ * grains, whose absolute zero is at `absolute_zero` (0 for kelvin, -273.15 for degrees Celsius). */
+typedef struct GrainSurface {
+  double coefficient, fluid_temperature; /* of convection, W/(m2 K), >= 0 */
+  double emissivity, surroundings;       /* 0 to 1; >= absolute_zero */
+  double absolute_zero;
+} GrainSurface;
+/* Heat into a grain of the given radius, m, and temperature, W: Newton's law of cooling. */
+double grain_convection(const GrainSurface *exchange, double radius, double temperature);
+/* Stefan-Boltzmann: sigma emissivity 4 pi R^2 (T_s^4 - T^4), absolute temperatures, W. Surroundings are black or
+ * large. */
+double grain_radiation(const GrainSurface *exchange, double radius, double temperature);
 
 #ifdef __cplusplus
 }

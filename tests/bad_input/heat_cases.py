@@ -29,7 +29,17 @@ fix heat all heat/gran/grain initial_temperature 300 direct pipe area hertz &
 run             2
 """
 LAYER = "indirect layer fluid 0.026 layer 0.4 minimum_gap 1e-6"
+WALL = "fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.005 temperature 400\nrun 2"
 VORONOI = "indirect voronoi_b fluid 0.026 porosity 0.4 core 0.5 reach 0.5"
+STIFFNESS = """
+fix s1 all property/global kn peratomtypepair 1 1000
+fix s2 all property/global kt peratomtypepair 1 500
+fix s3 all property/global gamman peratomtypepair 1 1
+fix s4 all property/global gammat peratomtypepair 1 1
+fix s5 all property/global coefficientRollingFriction peratomtypepair 1 0.1
+pair_style      gran model hooke/stiffness tangential history"""
+SPRINGS = (("reach 0.5", "fix m4", "pair_style      gran model hertz tangential history"),
+           ("reach 0.5 friction yes", "fix m4", STIFFNESS))
 
 
 class HeatCase(Case):
@@ -46,8 +56,8 @@ HEAT_CASES = [
     heat("no_temperature", "initial_temperature 300 ", "", "'initial_temperature'", "missing"),
     heat("temperature_nan", "temperature 300", "temperature nan", "'initial_temperature'", "'nan'", "finite"),
     heat("no_direct", "direct pipe area hertz ", "", "'direct'", "missing", "batchelor"),
-    heat("wrong_direct", "direct pipe", "direct collisional", "'direct'", "'collisional'",
-         "batchelor, liggghts or pipe"),
+    heat("wrong_direct", "direct pipe", "direct conductive", "'direct'", "'conductive'",
+         "batchelor, liggghts, pipe or collisional"),
     heat("wrong_indirect", "indirect voronoi_b", "indirect voronoi", "'indirect'", "'voronoi'", "voronoi_a"),
     heat("wrong_area", "area hertz", "area 0.001", "'area'", "'0.001'", "geometric or hertz"),
     heat("area_without_direct", "direct pipe", "direct none", "'area'", "'direct batchelor'"),
@@ -73,4 +83,37 @@ HEAT_CASES = [
          "another fix"),
     heat("twice_the_fix", "run             2", "fix too all heat/gran/grain initial_temperature 300 direct pipe\nrun 2",
          "another fix"),
+    heat("friction_with_hertz", "reach 0.5", "reach 0.5 friction yes", "'friction'", "hooke/stiffness"),
+    heat("friction_with_rolling", SPRINGS[0], (*SPRINGS[1][:2], SPRINGS[1][2] + " rolling_friction epsd2"),
+         "'friction'", "rolling_friction"),
+    heat("friction_after_run", (*SPRINGS[0][:2], "fix heat", SPRINGS[0][2]),
+         (*SPRINGS[1][:2], "run 1\nfix heat", SPRINGS[1][2]), "'friction'", "before it"),
+    heat("friction_unfix", (*SPRINGS[0], "run             2"), (*SPRINGS[1], "run 2\nunfix heat\nrun 2"),
+         "'friction yes'", "removed"),
+    heat("friction_given_up", (*SPRINGS[0], "run             2"),
+         (*SPRINGS[1], "run 2\nfix heat all heat/gran/grain initial_temperature 300 direct pipe\nrun 2"),
+         "'friction yes'", "first run"),
+    heat("friction_maybe", "reach 0.5", "reach 0.5 friction maybe", "'friction'", "'maybe'", "no or yes"),
+    heat("collisional_after_run", ("fix heat", "direct pipe"), ("run 1\nfix heat", "direct collisional"),
+         "'direct collisional'", "before it"),
+    heat("collisional_no_capacity", ("direct pipe", "thermalCapacity peratomtype 100"),
+         ("direct collisional", "thermalCapacity peratomtype 0"), "'thermalCapacity'", "> 0"),
+    heat("wall_without_direct", ("direct pipe area hertz", "run             2"), ("direct none", WALL), "'direct none'",
+         "fix wall/gran", "batchelor"),
+    heat("wall_below_zero", "run             2", WALL.replace("temperature 400", "temperature -20"), "fix floor", "-20",
+         ">= 0"),
+    heat("wall_contact_area", "run             2", WALL.replace("400", "400 contact_area projection"), "fix floor",
+         "'contact_area'", "overlap"),
+    heat("convection_without_temperature", "reach 0.5", "reach 0.5 convection 10", "'convection'", "number"),
+    heat("convection_negative", "reach 0.5", "reach 0.5 convection -1 300", "'convection'", "'-1'", ">= 0"),
+    heat("convection_infinite", "reach 0.5", "reach 0.5 convection 10 inf", "'convection'", "'inf'", "finite"),
+    heat("emissivity_above_one", "reach 0.5", "reach 0.5 radiation 1.1 300", "'radiation'", "'1.1'", "1"),
+    heat("radiation_below_zero", "reach 0.5", "reach 0.5 radiation 0.8 -20", "'radiation'", "-20", ">= 0",
+         "'absolute_zero'"),
+    heat("grains_below_zero", ("temperature 300", "reach 0.5"),
+         ("temperature -300", "reach 0.5 radiation 0.8 20 absolute_zero -273.15"), "'initial_temperature'", "-300",
+         ">= -273.15"),
+    heat("zero_without_radiation", "reach 0.5", "reach 0.5 absolute_zero 0", "'absolute_zero'", "'radiation'"),
+    heat("radiation_other_units", ("units           si", "reach 0.5"),
+         ("units           cgs", "reach 0.5 radiation 0.8 300"), "'radiation'", "'units si'", "cgs"),
 ]

@@ -370,6 +370,96 @@ static void wrong_models_are_refused(void **state) {
   assert_int_equal(grain_heat_check(&model), BASE_ERROR_ARGUMENT);
 }
 
+static void impacts_end_in_steady_conduction(void **state) {
+  (void)state;
+  const GrainHeat model = make_model(GRAIN_DIRECT_COLLISIONAL, GRAIN_INDIRECT_NONE, GRAIN_AREA_GEOMETRIC);
+  const GrainPair pair = {.radius = {1, 2}, .conductivity = {1, 5}, .distance = 2.9};
+  GrainImpact impact = {.radius_max = 0.1, .duration = 1e-3, .heat_capacity = {1, 3}};
+  const double steady = grain_heat_conductance(&model, &pair), mean = grain_direct_collisional(&pair, &impact);
+  assert_true(mean > 0.0 && steady == grain_direct_batchelor(&pair, grain_radius_geometric(&pair)));
+  double worst = 0.0;
+  note(&worst, grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 2e-4), mean);
+  note(&worst, grain_heat_impact_conductance(&model, &pair, &impact, 9.5e-4, 2e-4), 0.25 * mean + 0.75 * steady);
+  note(&worst, grain_heat_impact_conductance(&model, &pair, &impact, 1e-3, 2e-4), steady);
+  AT_MOST(worst, 1e-12);
+  const GrainPair other = {.radius = {2, 1}, .conductivity = {5, 1}, .distance = 2.9};
+  const GrainImpact turned = {.radius_max = 0.1, .duration = 1e-3, .heat_capacity = {3, 1}};
+  assert_true(grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 1e-4) ==
+              grain_heat_impact_conductance(&model, &other, &turned, 0.0, 1e-4));
+  impact.duration = 1.0; /* Fourier number 100: the fit has no value */
+  assert_true(grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 1e-4) == steady);
+}
+
+/* ---------------------------------------------------------------------------------------------------- slip */
+/* Grain 0 above grain 1; it moves along x at 2 m/s, and its spin takes 1 m/s of that off at the point of contact. */
+static void slip_work_is_force_times_slip(void **state) {
+  (void)state;
+  const double k = 1000.0, dt = 1e-5, before[3] = {3e-6, 0, 0}, after[3] = {4e-6, 0, 0}, same[3] = {1.3e-5, 0, 0};
+  const GrainMotion motion = {.radius = {0.5, 0.25},
+                              .branch = {0, 0, 0.75},
+                              .velocity = {{2, 0, 7}, {0, 0, 0}},
+                              .spin = {{0, 2, 5}, {0, 0, 0}}};
+  double worst = 0.0;
+  note(&worst, grain_slip_work(&motion, k, dt, before, after), k * 3.5e-6 * (3e-6 + 1e-5 - 4e-6));
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_slip_work(&motion, k, dt, before, same) == 0.0); /* the spring takes it all: no slip */
+  const GrainMotion other = {.radius = {0.25, 0.5},
+                             .branch = {0, 0, -0.75},
+                             .velocity = {{0, 0, 0}, {2, 0, 7}},
+                             .spin = {{0, 0, 0}, {0, 2, 5}}};
+  const double before2[3] = {-3e-6, 0, 0}, after2[3] = {-4e-6, 0, 0};
+  worst = 0.0;
+  note(&worst, grain_slip_work(&other, k, dt, before2, after2), grain_slip_work(&motion, k, dt, before, after));
+  AT_MOST(worst, 1e-14);
+}
+
+/* ------------------------------------------------------------------------------------------------- surface */
+static void surfaces_exchange_heat_by_newton_and_stefan_boltzmann(void **state) {
+  (void)state;
+  const GrainSurface kelvin = {
+      .coefficient = 25.0, .fluid_temperature = 300.0, .emissivity = 0.8, .surroundings = 400.0};
+  const double area = 4.0 * PI * 0.01 * 0.01;
+  double worst = 0.0;
+  note(&worst, grain_convection(&kelvin, 0.01, 350.0), -25.0 * area * 50.0);
+  note(&worst, grain_radiation(&kelvin, 0.01, 500.0), -0.8 * area * 5.670374419e-8 * (625e8 - 256e8));
+  note(&worst, grain_radiation(&kelvin, 0.01, 0.0), 0.8 * area * 5.670374419e-8 * 256e8);
+  /* Near equilibrium: 4 T^3 dT to first order. */
+  const double small = ldexp(1.0, -20);
+  note(&worst, grain_radiation(&kelvin, 0.01, 400.0 - small) / (0.8 * area * 5.670374419e-8),
+       4.0 * 64e6 * small * (1.0 - 1.5 * small / 400.0));
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_radiation(&kelvin, 0.01, 400.0) == 0.0 && grain_convection(&kelvin, 0.01, 300.0) == 0.0);
+  /* The same on the scale of Celsius. */
+  const GrainSurface celsius = {.emissivity = 0.8, .surroundings = 400.0 - 273.15, .absolute_zero = -273.15};
+  worst = 0.0;
+  note(&worst, grain_radiation(&celsius, 0.01, 500.0 - 273.15), grain_radiation(&kelvin, 0.01, 500.0));
+  AT_MOST(worst, 1e-14);
+}
+
+/* --------------------------------------------------------------------------------------------------- walls */
+static void a_wall_is_a_grain_of_infinite_radius(void **state) {
+  (void)state;
+  const double radius = 0.005, huge = 1e6 * radius, k[2] = {20.0, 90.0};
+  double worst = 0.0;
+  for (int n = 0; n < 40; n++) {
+    const double overlap = radius * ldexp(0.75, -(n % 8));
+    const GrainDirect direct = n & 1 ? GRAIN_DIRECT_BATCHELOR : GRAIN_DIRECT_LIGGGHTS;
+    const GrainHeat model =
+        make_model(direct, GRAIN_INDIRECT_NONE, n < 20 ? GRAIN_AREA_HERTZ : GRAIN_AREA_GEOMETRIC);
+    const double wall = grain_heat_wall_conductance(&model, radius, k, radius - overlap);
+    const GrainPair pair = {{radius, huge}, {k[0], k[1]}, radius + huge - overlap};
+    assert_true(wall > 0.0);
+    note(&worst, grain_heat_conductance(&model, &pair), wall);
+  }
+  AT_MOST(worst, 2e-6);
+  const GrainHeat pipe = make_model(GRAIN_DIRECT_PIPE, GRAIN_INDIRECT_NONE, GRAIN_AREA_GEOMETRIC);
+  worst = 0.0;
+  note(&worst, grain_heat_wall_conductance(&pipe, 5.0, k, 4.0), PI * 9.0 * 20.0 / 4.0);
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_heat_wall_conductance(&pipe, 5.0, k, 5.0) == 0.0);
+  assert_true(grain_heat_wall_conductance(&pipe, 5.0, (double[2]){20.0, 0.0}, 4.0) == 0.0);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(models_meet_the_reference_values),
@@ -380,6 +470,10 @@ int main(void) {
       cmocka_unit_test(nothing_conducts_beyond_the_reach),
       cmocka_unit_test(deep_overlaps_and_insulators_give_finite_values),
       cmocka_unit_test(wrong_models_are_refused),
+      cmocka_unit_test(a_wall_is_a_grain_of_infinite_radius),
+      cmocka_unit_test(impacts_end_in_steady_conduction),
+      cmocka_unit_test(slip_work_is_force_times_slip),
+      cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "heat_walls.h"
+
+/* An installed LIGGGHTS lacks the generated list of contact models that the headers of its walls ask for. All they use
+ * of it, in templates that are not instantiated here, are names for "no model"; the rest counts as read. */
+#define CONTACT_MODEL_CONSTANTS_H_
+namespace LIGGGHTS {
+namespace ContactModels {
+static const int NORMAL_OFF = 9, TANGENTIAL_OFF = 0, COHESION_OFF = 0, ROLLING_OFF = 0;
+}
+}  // namespace LIGGGHTS
+
+#include "atom.h"
+#include "fix_contact_history_mesh.h"
+#include "fix_mesh_surface.h"
+#include "fix_neighlist_mesh.h"
+#include "fix_wall_gran.h"
+#include "modify.h"
+#include "primitive_wall.h"
+#include "rank_error.h"
+
+using namespace LAMMPS_NS;
+
+/* LIGGGHTS has no public way to these members of its walls; a derived class may name them. */
+namespace {
+struct Access : FixWallGran {
+  static bool FixWallGran::*conducts() { return &Access::heattransfer_flag_; }
+  static double FixWallGran::*temperature() { return &Access::Temp_wall; }
+  static int FixWallGran::*area() { return &Access::area_calculation_mode_; }
+};
+const int AREA_OVERLAP = 0; /* `contact_area overlap`, the default */
+const double NO_TEMPERATURE = -1.0;
+}  // namespace
+
+void HeatWalls::take_over(const Fix *fix) {
+  walls_.clear();
+  for (int k = 0; k < modify->nfix; k++) {
+    FixWallGran *wall = dynamic_cast<FixWallGran *>(modify->fix[k]);
+    if (!wall) continue;
+    const double temperature = wall->*Access::temperature();
+    if (!wall->is_mesh_wall() && temperature < 0.0 && temperature != NO_TEMPERATURE)
+      fix_failed(lmp, fix,
+                 format_text("fix %s has the temperature %g: LIGGGHTS' walls conduct at temperatures >= 0 only",
+                             wall->id, temperature));
+    if (!(wall->*Access::conducts())) continue;
+    if (wall->*Access::area() != AREA_OVERLAP)
+      fix_failed(lmp, fix,
+                 format_text("fix %s has another 'contact_area' than overlap: allowed is overlap, as keyword 'area' "
+                             "of this fix holds at walls, too",
+                             wall->id));
+    wall->*Access::conducts() = false;
+    walls_.push_back(wall);
+  }
+}
+
+const std::vector<WallContact> &HeatWalls::find_contacts() {
+  contacts_.clear();
+  for (FixWallGran *wall : walls_) {
+    if (!wall->is_mesh_wall()) touch_primitive(wall);
+    for (int k = 0; wall->is_mesh_wall() && k < wall->n_meshes(); k++) touch_mesh(wall->mesh_list()[k]);
+  }
+  return contacts_;
+}
+
+void HeatWalls::touch_primitive(FixWallGran *wall) {
+  int *near;
+  const int count = wall->primitiveWall()->getNeighbors(near);
+  for (int n = 0; n < count; n++) {
+    const int i = near[n];
+    double delta[3];
+    if (!(atom->mask[i] & wall->groupbit)) continue;
+    const double gap = wall->primitiveWall()->resolveContact(atom->x[i], atom->radius[i], delta);
+    if (gap < 0.0)
+      contacts_.push_back({i, wall->atom_type_wall(), atom->radius[i] + gap, wall->*Access::temperature()});
+  }
+}
+
+/* A particle near an edge lies on several triangles. The history of its contacts, in the walls' post_force(), holds
+ * those of them that exert a force. */
+static bool is_partner(FixContactHistoryMesh *history, int i, int triangle) {
+  for (int k = 0; k < history->nneighs(i); k++)
+    if (history->get_partner_idTri(i, k) == triangle) return true;
+  return false;
+}
+
+void HeatWalls::touch_mesh(FixMeshSurface *fix_mesh) {
+  TriMesh *mesh = fix_mesh->triMesh();
+  const ScalarContainer<double> *temperature = mesh->prop().getGlobalProperty<ScalarContainer<double>>("Temp");
+  if (!temperature) return;
+  for (int t = 0; t < mesh->sizeLocal() + mesh->sizeGhost(); t++)
+    for (const int i : fix_mesh->meshNeighlist()->get_contact_list(t)) {
+      double delta[3], corner[3]; /* corner: barycentric coordinates */
+      int sides;
+      if (i >= atom->nlocal || !is_partner(fix_mesh->contactHistory(), i, mesh->id(t))) continue;
+      const double gap = mesh->resolveTriSphereContactBary(i, t, atom->radius[i], atom->x[i], delta, corner, sides);
+      if (gap < 0.0)
+        contacts_.push_back({i, fix_mesh->atomTypeWall(), atom->radius[i] + gap, (*temperature)(0)});
+    }
+}
