@@ -88,7 +88,7 @@ def ledger(table):
 
 
 def draw(study, curves, alone, fields):
-    figure, axes = plt.subplots(1, 5, figsize=(15, 4), gridspec_kw={"width_ratios": [2.2, 1, 1, 1, 1]})
+    figure, axes = plt.subplots(1, 5, figsize=(15, 4), layout="constrained", gridspec_kw={"width_ratios": [2.2, 1, 1, 1, 1]})
     for name, colour in (("dense", "C3"), ("loose", "C0")):
         strain, stress = curves[name]
         axes[0].plot(100 * strain, stress, color=colour, label=f"{name}, specimen")

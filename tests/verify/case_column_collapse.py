@@ -22,7 +22,7 @@ def verify(study):
 
 def strength(study):
     grains, seeds = (400, 8) if study.full else (200, 3)
-    figure, axes = plt.subplots(1, 3, figsize=(11, 3.4))
+    figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
     for axis, pressure in zip(axes, (1e4, 2.5e4, 5e4)):
         peaks = []
         for k, bond in enumerate((0, 0.01, 0.02)):
@@ -121,7 +121,7 @@ def compare_with_strength(study, runs, packing):
 
 
 def draw(study, runs):
-    figure, axes = plt.subplots(1, 2, figsize=(10, 3.6))
+    figure, axes = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
     for k, (name, run) in enumerate(runs.items()):
         time, front, kinetic, potential = series(run)
         label = "no bonds" if name == "bare" else rf"$\beta_b$ = {name}"

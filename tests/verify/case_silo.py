@@ -57,7 +57,7 @@ def judge(study, runs, frames):
 
 
 def draw(study, runs, frames):
-    figure, axes = plt.subplots(1, 3, figsize=(11, 4), gridspec_kw={"width_ratios": [1.5, 1, 1]})
+    figure, axes = plt.subplots(1, 3, figsize=(11, 4), layout="constrained", gridspec_kw={"width_ratios": [1.5, 1, 1]})
     for k, (case, run) in enumerate(runs.items()):
         time = np.array(run.table["Time"]) - run.table["Time"][0]
         axes[0].plot(time, 100 * np.array(run.table["above"]), label=case)

@@ -61,7 +61,7 @@ class Study:
                      for key, value in (variables or {}).items()}
         program = BUILD / "dempm"
         mark = path / "finished.json"
-        sources = [f for folder in folders for f in (EXAMPLES / folder).iterdir() if f.is_file()] + list(files)
+        sources = [f for folder in folders for f in (EXAMPLES / folder).iterdir() if f.is_file() and f.suffix != ".md"] + list(files)
         digest = hashlib.sha256()
         for source in sorted(sources, key=lambda f: f.name):
             digest.update(source.name.encode() + source.read_bytes())
