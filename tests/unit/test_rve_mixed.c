@@ -4,13 +4,7 @@
 
 #include "cuda_rve/rve_packing.h"
 
-/* Of a stress after one step. Without fused products, as compiled for the sanitizers, positions in two parts lose some of what the
- * second part holds: 3.2e-5, as much as if the rounding of the cell were lost, which the other build then shows. */
-#ifdef __SANITIZE_ADDRESS__
-static const double ROUND_OFF = 5e-5;
-#else
-static const double ROUND_OFF = 2e-5;
-#endif
+static const double ROUND_OFF = 2e-5; /* of a stress after one step */
 
 static double stress_distance(const RveAnswer *a, const RveAnswer *b) {
   double worst = 0.0, size = 0.0;
