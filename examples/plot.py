@@ -28,6 +28,8 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
+import thermo  # examples/thermo.py
+
 # Columns of f_ID[...] of fix mpm/couple (doc/fix_mpm_couple.md).
 PRESSURE, STRAIN, RATIO, VOLUME, TEMPERATURE, FRACTION, COORDINATION, BONDS = 7, 10, 11, 12, 13, 15, 16, 17
 # name: (column, label, colour map). Perceptually uniform maps, readable with every kind of colour vision.
@@ -155,19 +157,11 @@ class Run:
         return sorted(set(np.linspace(0, len(self.files) - 1, count).round().astype(int).tolist()))
 
     def thermo(self):
-        """Columns of the thermo output of all `run` commands one after the other: {name: array}."""
-        table, names = {}, None
-        for line in self.log.splitlines():
-            words = line.split()
-            if words and words[0] == "Step":
-                names = words
-            elif line.startswith("Loop time"):
-                names = None
-            elif names and len(words) == len(names) and re.fullmatch(r"\d+", words[0]):
-                for name, word in zip(names, words):
-                    table.setdefault(name, []).append(float(word))
-        lengths = {len(column) for column in table.values()}
-        return {name: np.array(column) for name, column in table.items()} if len(lengths) == 1 else {}
+        """Columns of the thermo output of all `run` commands one after the other: {name: array}; none if they differ."""
+        runs = thermo.tables(self.log)
+        if len({tuple(table) for table in runs}) != 1:
+            return {}
+        return {name: np.concatenate([table[name] for table in runs]) for name in runs[0]}
 
 
 # -------------------------------------------------------------------------------------------------------------- points

@@ -3,25 +3,14 @@
 """Figures of the column collapse from its logs: run length, grains, particle-steps per second, runout, balances."""
 import argparse
 import pathlib
+import sys
 
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from thermo import last_table  # noqa: E402  (examples/thermo.py)
+
 OUT = pathlib.Path(__file__).resolve().parent / "out"
-
-
-def thermo(log):
-    """Columns of the last thermo table of a log, as arrays."""
-    names, rows = None, []
-    for line in log.read_text(errors="replace").splitlines():
-        words = line.split()
-        if words and words[0] == "Step":
-            names, rows = words, []
-        elif names and len(words) == len(names):
-            try:
-                rows.append([float(word) for word in words])
-            except ValueError:
-                pass
-    return dict(zip(names, np.array(rows).T))
 
 
 def energies(table):
@@ -52,7 +41,7 @@ def momentum_error(case, table):
 
 
 def report(case, grains):
-    table = thermo(OUT / f"log.{case}")
+    table = last_table(OUT / f"log.{case}")
     points = None
     for line in (OUT / f"log.{case}").read_text(errors="replace").splitlines():
         if line.strip().endswith("atoms") and line.split()[0].isdigit():

@@ -3,26 +3,15 @@
 """Figures of the silo from its logs and point files: discharge, temperatures and where they are, energies, leaks."""
 import argparse
 import pathlib
+import sys
 
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from thermo import last_table  # noqa: E402  (examples/thermo.py)
+
 OUT = pathlib.Path(__file__).resolve().parent / "out"
 OUTLET, SHOULDER, EDGE = 1.0, 1.4, 0.4  # m: heights of outlet and hopper's top; end of its left wall
-
-
-def thermo(log):
-    """Columns of the last thermo table of a log, as arrays."""
-    names, rows = None, []
-    for line in log.read_text(errors="replace").splitlines():
-        words = line.split()
-        if words and words[0] == "Step":
-            names, rows = words, []
-        elif names and len(words) == len(names):
-            try:
-                rows.append([float(word) for word in words])
-            except ValueError:
-                pass
-    return dict(zip(names, np.array(rows).T))
 
 
 def frames(path):
@@ -53,7 +42,7 @@ def leaks(points):
 
 
 def report(case):
-    table, series = thermo(OUT / f"log.{case}"), frames(OUT / f"{case}_points.txt")
+    table, series = last_table(OUT / f"log.{case}"), frames(OUT / f"{case}_points.txt")
     time, left, mass = table["Time"] - table["Time"][0], table["above"], table["mpm[1]"][0]
     change = lambda name: table[name][-1] - table[name][0]
     seconds, steps = table["CPU"][-1], change("mpm[12]")

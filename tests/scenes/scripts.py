@@ -37,6 +37,18 @@ fix floor all mpm/wall mpm plane y 0 friction 0.5 side +
 fix ram all mpm/wall mpm box 1.6 1.8 -0.1 1 velocity -0.5 0 0
 """
 
+# Properties of grains: contact law, and heat.
+GRAINS = """
+fix kn all property/global kn peratomtypepair 1 1e6
+fix kt all property/global kt peratomtypepair 1 1e6
+fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+"""
+GRAIN_HEAT = """
+fix beta all property/global thermalExpansionCoefficient peratomtype 1e-5
+fix c all property/global thermalCapacity peratomtype 670
+"""
+
+
 def elastic_block(boundary="f f", points=POINTS, transfer="flip 1", extra=""):
     return BOX.format(boundary=boundary) + points + ELASTIC.format(transfer=transfer, extra=extra)
 

@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 from conftest import BUILD, execute
-from scripts import BOX, HEAD, state, state_dump
+from scripts import BOX, GRAINS, HEAD, state, state_dump
 
 SPACING, HEIGHT, GRAVITY = 0.2, 1.2, 9.8
 MATERIAL = """
 neighbor 0.05 bin
 timestep 1e-4
-fix kn all property/global kn peratomtypepair 1 1e6
-fix kt all property/global kt peratomtypepair 1 1e6
-fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+""" + GRAINS + """
 fix rve all mpm/rve packing grains.packing model hooke/stiffness tangential history grain disk thickness 0.075 &
   density 2650 damping viscous 0.2 rest {rest}
 fix mpm all mpm/couple grid 0.4 shape gimp transfer flip 0.99 material rve rve point/size 0.2 0.2 damping/point {damping}

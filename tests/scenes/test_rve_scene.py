@@ -4,7 +4,7 @@ import math
 import struct
 
 import pytest
-from scripts import BOX, HEAD, state, state_dump
+from scripts import BOX, GRAIN_HEAT, GRAINS, HEAD, state, state_dump
 
 GRAIN_RADIUS, COLUMNS, ROWS, OVERLAP = 0.005, 6, 6, 1e-3
 
@@ -35,11 +35,7 @@ set group all vx 0.2
 MATERIAL = """
 neighbor 0.05 bin
 timestep 1e-4
-fix kn all property/global kn peratomtypepair 1 1e6
-fix kt all property/global kt peratomtypepair 1 1e6
-fix mu all property/global coefficientFriction peratomtypepair 1 0.5
-fix beta all property/global thermalExpansionCoefficient peratomtype 1e-5
-fix c all property/global thermalCapacity peratomtype 670
+""" + GRAINS + GRAIN_HEAT + """
 fix rve all mpm/rve packing grains.data model hooke/stiffness tangential history grain disk thickness 0.075 &
   density 2650 damping viscous 0.2 {thermal_rve} bonds strength 0.01 shear_ratio 1 melting {melting}
 fix mpm all mpm/couple grid 0.1 shape gimp transfer flip 0.99 material rve rve point/size 0.05 0.05 {thermal}

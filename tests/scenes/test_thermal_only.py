@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from scripts import BOX
+from scripts import BOX, GRAIN_HEAT, GRAINS
 from test_rve_scene import GRAIN_RADIUS, OVERLAP, packing
 
 SCRIPT = BOX.format(boundary="f f") + """
@@ -12,11 +12,7 @@ region bar block 0.5 1.5 0.5 0.55 -0.025 0.025 units box
 create_atoms 1 region bar
 neighbor 0.05 bin
 timestep {dt}
-fix kn all property/global kn peratomtypepair 1 1e6
-fix kt all property/global kt peratomtypepair 1 1e6
-fix mu all property/global coefficientFriction peratomtypepair 1 0.5
-fix beta all property/global thermalExpansionCoefficient peratomtype 1e-5
-fix c all property/global thermalCapacity peratomtype 670
+""" + GRAINS + GRAIN_HEAT + """
 fix rve all mpm/rve packing grains.data model hooke/stiffness tangential history grain disk thickness 0.075 &
   density 2650 pipe_resistance 1e3 reference 0
 fix mpm all mpm/couple grid 0.05 shape gimp transfer flip 1 material rve rve thermal yes temperature 0 mechanics no
