@@ -67,7 +67,7 @@ static Fix *create(LAMMPS *lmp, int narg, char **arg) {
 void LAMMPS_NS::register_styles(LAMMPS *lmp) {
   std::map<std::string, FixCreator> &map = *(lmp->modify->*member_of(FixMap()));
 #define FIX_CLASS
-#define FixStyle(name, Class) map[#name] = &create<Class>;
+#define FixStyle(Name, Class) map[#Name] = &create<Class>;
 #include "fix_heat_gran_grain.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
