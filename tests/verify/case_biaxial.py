@@ -21,7 +21,8 @@ def verify(study):
         alone[name] = element_curves(study, name, friction, grains)
         fields[name] = runs[name].dump(f"out/{name}.dump")
     strength(study, runs, curves, alone)
-    band(study, runs, fields)
+    localisation(study, runs, fields)
+    inclined_band(study, runs["dense"] if study.full else fine_run(study))
     for name, run in runs.items():
         study.check(f"{name}: energy ledger, sum over work", ledger(run.table), 0.01, run)
     draw(study, curves, alone, fields)
@@ -62,12 +63,12 @@ def columns(frame):
     return {name: np.array(values) for name, values in frame[1].items()}
 
 
-def band(study, runs, fields):
-    localisation = {}
+def localisation(study, runs, fields):
+    sharpness = {}
     for name, frames in fields.items():
         last = columns(frames[-1])
         strain, heat = last["f_mpm[10]"], last["f_mpm[13]"]
-        localisation[name] = strain.max() / strain.mean()
+        sharpness[name] = strain.max() / strain.mean()
         if name == "loose":
             continue
         hottest = strain[np.argmax(heat)]
@@ -75,9 +76,66 @@ def band(study, runs, fields):
         wide = lambda values: np.mean(values > 0.5 * values.max())
         study.check("dense: band of half the strain over band of half the heating, area", wide(strain) / wide(heat), 1.0, runs[name])
         study.check("dense: largest rise of temperature, K", heat.max(), None, runs[name])
-    study.check("dense: mean over largest shear strain (a band is sharp)", 1 / localisation["dense"], 0.5, runs["dense"])
-    study.check("loose: sharpness of its band over that of the dense", localisation["loose"] / localisation["dense"], 1.0,
+    study.check("dense: mean over largest shear strain (a band is sharp)", 1 / sharpness["dense"], 0.5, runs["dense"])
+    study.check("loose: sharpness of its band over that of the dense", sharpness["loose"] / sharpness["dense"], 1.0,
                 runs["loose"])
+
+
+def fine_run(study):
+    """The paper's 10 x 20 cells, which an inclined band needs, with smaller packings than the paper's, to 10 %."""
+    packing = study.pack("fine", preparation_friction=PREPARATION["dense"], grains=100, **GRAINS)
+    return study.run("fine", "in.biaxial", {"size": "paper", "name": "dense", "packing": packing.name, "seconds": 10}, ["biaxial"],
+                     [packing], grains=100)
+
+
+def inclination(frame):
+    """Degrees between the horizontal and the stronger of the two bands through the middle, by its second moments: points with
+    more than twice the mean shear strain."""
+    x, y, strain = frame["x"] - 0.5, frame["y"], frame["f_mpm[10]"]
+    weight = np.where(strain > 2 * strain.mean(), strain, 0.0)
+    y = y - np.average(y, weights=weight)
+    arms = [np.where(sign * x * y > 0, weight, 0.0) for sign in (-1, 1)]
+    arm = max(arms, key=np.sum)
+    axis = np.linalg.eigh(np.stack([x * arm, y * arm]) @ np.stack([x, y]).T)[1][:, 1]
+    return np.degrees(np.arctan2(abs(axis[1]), abs(axis[0])))
+
+
+def inclined_band(study, run):
+    """Born between the directions of Roscoe (45 degrees + half the angle of dilatancy, which is positive in a dense packing) and
+    Coulomb (45 degrees + half the angle of friction); later it turns with the body."""
+    strain, stress = curve(run.table)
+    frames = {step: columns((step, values)) for step, values in run.dump("out/dense.dump")}
+    steps = {percent: int(round(percent / 100 * HEIGHT / SPEED / 1e-3)) for percent in (2.5, 5, 10)}
+    angle = inclination(frames[steps[5]])
+    peak = stress.max() * 1e3
+    friction = np.degrees(np.arcsin((peak - PRESSURE) / (peak + PRESSURE)))
+    shear, heat = frames[steps[10]]["f_mpm[10]"], frames[steps[10]]["f_mpm[13]"]
+    study.check("dense, 10 x 20 cells: inclination of the band at 5 %, outside of 45 degrees to Coulomb's by, degrees",
+                max(45 - angle, angle - 45 - friction / 2, 0.0), 0.0, run)
+    study.check("dense, 10 x 20 cells: mean over largest shear strain at 10 %", shear.mean() / shear.max(), 0.3, run)
+    study.check("dense, 10 x 20 cells: share of points that are sheared more than the hottest one",
+                np.mean(shear > shear[np.argmax(heat)]), 0.1, run)
+    wide = lambda values: np.mean(values > 0.5 * values.max())
+    study.check("dense, 10 x 20 cells: band of half the strain over band of half the heating, area", wide(shear) / wide(heat), None, run)
+    study.note(f"10 x 20 cells: band at {angle:.0f} degrees at 5 % (Coulomb {45 + friction / 2:.0f}), "
+               f"{inclination(frames[steps[10]]):.0f} at 10 %; peak {peak / 1e3:.0f} kPa; largest rise of temperature "
+               f"{heat.max():.4f} K at 10 %.")
+    draw_band(study, frames, steps)
+
+
+def draw_band(study, frames, steps):
+    figure, axes = plt.subplots(1, 4, figsize=(11, 4), layout="constrained")
+    for axis, (percent, column, title) in zip(axes, [(2.5, "f_mpm[10]", "shear strain"), (5, "f_mpm[10]", "shear strain"),
+                                                     (10, "f_mpm[10]", "shear strain"), (10, "f_mpm[13]", "heating [K]")]):
+        draw_field(figure, axis, frames[steps[percent]], column, f"{percent:g} %: {title}")
+    study.save(figure, "biaxial_band")
+
+
+def draw_field(figure, axis, frame, column, title):
+    shown = axis.scatter(frame["x"], frame["y"], c=frame[column], s=1600 / np.sqrt(len(frame["x"])) / 5, marker="s",
+                         cmap="viridis" if "10" in column else "inferno")
+    axis.set(title=title, aspect="equal", xlim=(-0.15, 1.15), ylim=(0, None))
+    figure.colorbar(shown, ax=axis, shrink=0.7)
 
 
 def ledger(table):
@@ -99,9 +157,5 @@ def draw(study, curves, alone, fields):
     axes[0].legend(frameon=False, fontsize=8)
     for k, (name, column, title) in enumerate([("dense", "f_mpm[10]", "shear strain"), ("dense", "f_mpm[13]", "heating [K]"),
                                                ("loose", "f_mpm[10]", "shear strain"), ("loose", "f_mpm[13]", "heating [K]")]):
-        last = columns(fields[name][-1])
-        shown = axes[1 + k].scatter(last["x"], last["y"], c=last[column], s=1600 / np.sqrt(len(last["x"])) / 5, marker="s",
-                                    cmap="viridis" if "10" in column else "inferno")
-        axes[1 + k].set(title=f"{name}: {title}", aspect="equal", xlim=(-0.15, 1.15), ylim=(0, 1.7))
-        figure.colorbar(shown, ax=axes[1 + k], shrink=0.7)
+        draw_field(figure, axes[1 + k], columns(fields[name][-1]), column, f"{name}: {title}")
     study.save(figure, "biaxial")
