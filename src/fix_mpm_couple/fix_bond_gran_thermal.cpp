@@ -34,7 +34,8 @@ FixBondGranThermal::FixBondGranThermal(LAMMPS *lammps, int narg, char **arg)
       temperature_(NULL),
       heat_(NULL),
       round_(0),
-      grown_(0) {
+      grown_(0),
+      types_(0) {
   scalar_flag = vector_flag = peratom_flag = 1;
   size_vector = COUNTS;
   global_freq = peratom_freq = 1;
@@ -117,7 +118,7 @@ void FixBondGranThermal::read_springs() {
     fix_failed(lmp, this,
                "allowed is pair_style gran with 'tangential history' or 'off', without models that have a history of "
                "their own (rolling_friction epsd..., cohesion with liquid)");
-  const int count = types();
+  const int count = types_ = atom->get_properties()->max_type() + 1;
   const NumberRange any = NumberRange::at_least(0.0);
   springs_.assign(count * count, PairSprings{});
   for (int a = 1; a < count; a++)
@@ -141,8 +142,6 @@ void FixBondGranThermal::find_temperature() {
                "bonds melt, but grains (and their copies on other ranks) have no temperature: a fix heat/gran/... is "
                "needed, 'fix ID all property/atom Temp scalar yes yes no T', or 'melting none'");
 }
-
-int FixBondGranThermal::types() const { return atom->get_properties()->max_type() + 1; }
 
 void FixBondGranThermal::setup_pre_force(int vflag) { pre_force(vflag); }
 
@@ -201,7 +200,7 @@ double FixBondGranThermal::effective_mass(int i, int j) const {
 }
 
 void FixBondGranThermal::find_springs(int i, Bond &bond) const {
-  const PairSprings &springs = springs_[atom->type[i] * types() + atom->type[bond.other]];
+  const PairSprings &springs = springs_[atom->type[i] * types_ + atom->type[bond.other]];
   const double mass = effective_mass(i, bond.other);
   bond.springs = {springs.normal, springs.tangential, springs.gamman * mass, springs.gammat * mass};
 }

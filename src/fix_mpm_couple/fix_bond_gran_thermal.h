@@ -93,6 +93,7 @@ class FixBondGranThermal : public Fix {
   int round_;                    /* of messages to partners */
   std::vector<Message> heard_;
   int grown_;                    /* length of vector_atom */
+  int types_;                    /* rows of springs_; row and column 0 are unused */
 
   void read_springs();
   void find_temperature();
@@ -112,7 +113,6 @@ class FixBondGranThermal : public Fix {
   void end_bond(Bond &bond);
   void hold(int i, Bond &bond, double step);
   bool shared(const Bond &bond) const { return bond.listed && bond.state.overlap > 0.0; }
-  int types() const;
 };
 
 }  // namespace LAMMPS_NS
