@@ -282,4 +282,5 @@ def test_energy(dempm, tangential, strength):
     intact = run.table["f_bond"][-1]
     print(f"energy {start} J, then {stop} J, bonds {intact}")
     assert intact == 1.0 if strength == 1.0 else 0.1 < intact < 0.9
-    assert stop == pytest.approx(start, rel=1e-4)
+    # A bond ends at the end of a step, which errs by up to its force times the way of a step: 200 bonds, 4e-7 J.
+    assert stop == pytest.approx(start, rel=1e-6 if intact == 1.0 else 5e-4)
