@@ -276,18 +276,40 @@ FixBondGranThermal::Bond *FixBondGranThermal::add_bond(int i, int j) {
 }
 
 void FixBondGranThermal::find_images() {
-  BaseStatus status = BASE_OK;
+  int missing = 0, all;
   for (int i = 0; i < atom->nlocal; i++)
     for (Bond &bond : bonds_[i]) {
       bond.other = domain->closest_image(i, atom->map(bond.partner));
       bond.listed = false, bond.history = NULL, bond.news = NONE;
-      if (bond.other < 0)
-        status = base_error(BASE_ERROR_ARGUMENT,
-                            "a bond of grain %d with grain %d, which is farther away than ranks see (%g) or was removed; a "
-                            "larger skin (command neighbor) widens that",
-                            atom->tag[i], bond.partner, comm->cutghost[0]);
+      missing += bond.other < 0;
     }
-  fix_check(lmp, this, status);
+  MPI_Allreduce(&missing, &all, 1, MPI_INT, MPI_SUM, world);
+  if (all > 0) forget_removed(missing);
+}
+
+/* Partners that this rank does not see: bonds with grains that are nowhere any more go with them. missing: of this rank. */
+void FixBondGranThermal::forget_removed(int missing) {
+  std::vector<int> mine, counts(comm->nprocs), starts(comm->nprocs + 1, 0);
+  for (int i = 0; i < atom->nlocal; i++)
+    for (const Bond &bond : bonds_[i])
+      if (bond.other < 0) mine.push_back(bond.partner);
+  MPI_Allgather(&missing, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (int rank = 0; rank < comm->nprocs; rank++) starts[rank + 1] = starts[rank] + counts[rank];
+  std::vector<int> partners(starts.back());
+  MPI_Allgatherv(mine.data(), missing, MPI_INT, partners.data(), counts.data(), starts.data(), MPI_INT, world);
+  int here = 0, there;
+  for (int partner : partners) {
+    const int i = atom->map(partner);
+    if (i >= 0 && i < atom->nlocal) here = std::max(here, partner);
+  }
+  MPI_Allreduce(&here, &there, 1, MPI_INT, MPI_MAX, world);
+  if (there > 0)
+    fix_failed(lmp, this,
+               format_text("a bond of grain %d is longer than what ranks see of each other's grains, %g; a larger skin (command "
+                           "neighbor) widens that", there, comm->cutghost[0]));
+  for (int i = 0; i < atom->nlocal; i++)
+    bonds_[i].erase(std::remove_if(bonds_[i].begin(), bonds_[i].end(), [](const Bond &bond) { return bond.other < 0; }),
+                    bonds_[i].end());
 }
 
 void FixBondGranThermal::find_contact(int i, int j, double *history, double sign) {

@@ -98,6 +98,7 @@ class FixBondGranThermal : public Fix {
   void read_springs();
   void find_temperature();
   void find_images();
+  void forget_removed(int missing);
   void find_contacts();
   void install();
   Bond *add_bond(int i, int j);

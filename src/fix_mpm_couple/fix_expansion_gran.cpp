@@ -78,7 +78,7 @@ double FixExpansionGran::max_rad(int type) {
   for (int i = 0; i < atom->nlocal; i++)
     if (atom->type[i] == type && (atom->mask[i] & groupbit)) largest = std::max(largest, atom->radius[i]);
   for (int k = 0; k < modify->nfix; k++)
-    if (modify->fix[k] != this && modify->fix[k]->use_rad_for_cut_neigh_and_ghost())
+    if (!modify->fix[k]->rad_mass_vary_flag && modify->fix[k]->use_rad_for_cut_neigh_and_ghost())
       largest = std::max(largest, modify->fix[k]->max_rad(type));
   return (1.0 + growth_) * largest;
 }

@@ -197,6 +197,54 @@ def test_grains_that_grow_into_each_other_are_found(dempm, np):
     assert end["fx"] == pytest.approx([-PLAIN["kn"] * overlap, PLAIN["kn"] * overlap], rel=1e-9)
 
 
+def test_bond_that_ends_by_shear_leaves_a_contact_that_slips_and_heats(dempm):
+    """Two free grains, pressed together and sheared: the bond ends, its spring becomes that of the contact, which slides until they
+    part. Motion, heat of friction and the springs at the start add up."""
+    overlap, capacity = 5e-5, 500.0
+    script = row([(0.0, 0.0, 0.0), (2 * R - overlap, 0.0, 0.0)], ROW_BOX, dict(dt=1e-7, expansion=0.0, strength=2e-4, mu=0.3),
+                 FIXES.replace("direct pipe", "direct pipe friction yes"))
+    script += "group two id 2\nvelocity two set 0 0.2 0 units box\nfix move all nve/sphere\n"
+    script += THERMO.replace("ke", "ke f_heat f_heat[4]") + FRAME.replace("omegaz", "omegaz mass").replace("run 0", "").replace(
+        '%.17g"', '%.17g %.17g"').replace("custom 1 ", "custom 10000 ") + "thermo 1\nrun 10000\n"
+    run = dempm(script)
+    assert run.table["f_bond[4]"][-1] == 1.0
+    frames = [frame for _, frame in run.dump("end.dump")]
+    motion_energy = [sum(0.5 * m * (frame["vx"][i] ** 2 + frame["vy"][i] ** 2 + 0.4 * (R * frame["omegaz"][i]) ** 2)
+                         for i, m in enumerate(frame["mass"])) for frame in (frames[0], frames[-1])]
+    assert math.dist(*((frames[-1]["x"][i], frames[-1]["y"][i]) for i in (0, 1))) > 2 * R
+    heat = sum(run.table["f_heat[4]"][1:]) * 1e-7
+    assert heat > 0.05 * motion_energy[0]
+    assert motion_energy[1] + heat + run.table["f_bond[7]"][-1] == pytest.approx(
+        motion_energy[0] + 0.5 * PLAIN["kn"] * overlap ** 2, rel=1e-4)
+
+
+def test_bonded_hertz_contact_in_compression_is_that_of_the_pair_style(dempm):
+    """Head on, without tension: no force of the bond until the grains part."""
+    rows = [(0.0, 0.0, 0.0), (2 * R - 1e-5, 0.0, 0.0)]
+    ends = []
+    for fixes in FIXES, FIXES.replace("fix_modify bond bonds install", ""):
+        script = row(rows, ROW_BOX, dict(expansion=0.0), fixes).replace("hooke/stiffness", "hertz")
+        script = script.replace("pair_style", HERTZ + "pair_style") + "group two id 2\nvelocity two set -0.1 0 0 units box\n"
+        run = dempm(script + "fix move all nve/sphere\n" + THERMO + "run 500\n" + FRAME)
+        ends.append(last(run))
+    assert run.table["f_bond"][-1] == 0.0 and ends[0] == ends[1] and ends[0]["x"][1] - ends[0]["x"][0] < 2 * R
+
+
+def test_bonds_go_with_a_grain_that_is_removed(dempm):
+    script = row([(2 * R * k, 0.0, 0.0) for k in range(4)], ROW_BOX, {}, FIXES.replace("{reference}\nfix_modify", "{reference} gap 1e-6\nfix_modify"))
+    run = dempm(script + THERMO + "run 1\ngroup two id 2\ndelete_atoms group two compress no\nrun 1\n")
+    assert [table["f_bond[2]"][-1] for table in run.thermo] == [3.0, 1.0]
+
+
+def test_bond_longer_than_ranks_see_is_an_error(dempm):
+    """Pulled apart across the boundary between two ranks by more than any bond may reach."""
+    script = row([(0.0, 0.0, 0.0), (2 * R, 0.0, 0.0)], "-0.05 0.06 -0.01 0.01 -0.01 0.01", dict(strength=100.0, expansion=0.0),
+                 FIXES.replace("{reference}\nfix_modify", "{reference} gap 1e-6\nfix_modify"), skin=1e-3)
+    script += "group two id 2\nfix go two move linear 100 0 0 units box\n" + THERMO
+    run = dempm(script + "run 100\n", np=2, check=False)
+    assert run.code > 0 and "Fix bond/gran/thermal (id bond)" in run.output and "larger skin" in run.output
+
+
 # ---------------------------------------------------------------------------------------- a cluster: energy, ranks, restart
 SIDE = (5, 5, 4)
 CLUSTER_BOX = "-0.02 0.07 -0.02 0.07 -0.02 0.06"
