@@ -251,15 +251,15 @@ CLUSTER_BOX = "-0.02 0.07 -0.02 0.07 -0.02 0.06"
 CLUSTER = dict(expansion=1e-5, conductivity=50.0, capacity=0.02, strength=4e-3, melting=400.0)
 
 
-def cluster(words, tangential="history"):
-    """A block of bonded grains in space whose grains fly apart at random speeds."""
+def cluster(words, tangential="history", drift=0.0):
+    """A block of bonded grains in space whose grains fly apart at random speeds; the block moves along x."""
     chance = random.Random(5)
     spacing, places = 2 * R * 0.9995, []
     for n in range(math.prod(SIDE)):
         places.append(tuple(spacing * k for k in (n % SIDE[0], n // SIDE[0] % SIDE[1], n // (SIDE[0] * SIDE[1]))))
     script = row(places, CLUSTER_BOX, {**CLUSTER, **words}, FIXES).replace("tangential history", f"tangential {tangential}")
     for axis, rate in zip(AXES, (37.3, 23.9, 71.7)):
-        script += f"variable v{axis} atom 0.1*sin({rate}*id*id)\n"
+        script += f"variable v{axis} atom {drift if axis == 'x' else 0.0}+0.1*sin({rate}*id*id)\n"
     script += "velocity all set v_vx v_vy v_vz units box\n"
     script += "fix move all nve/sphere\nrun 0\n"
     for n in range(1, len(places) + 1):
@@ -290,17 +290,19 @@ def after_restart(file, steps):
 
 
 def test_ranks_and_restart(dempm, tmp_path):
-    """N steps and N more: in one run of the program, on two ranks, from a restart file of one rank and of two."""
-    script = cluster({}) + "run 100\nwrite_restart half\nrun 100\n" + CLUSTER_FRAME
+    """N steps and N more: in one run of the program, on two ranks, from a restart file of one rank and of two. A fifth of the
+    grains goes over to the other rank."""
+    script = cluster({}, drift=60.0) + "run 100\nwrite_restart half\nrun 100\n" + CLUSTER_FRAME
     one = dempm(script, cwd=tmp_path / "one")
     two = dempm(script, np=2, cwd=tmp_path / "two")
+    whole = dempm(script.replace("run 100\nwrite_restart half\n", "").replace("run 100", "run 200"), cwd=tmp_path / "whole")
     made, intact = one.table["f_bond[1]"][-1], one.table["f_bond[2]"][-1]
     halfway = one.thermo[1]["f_bond[2]"][-1]
     assert 0.1 * made < intact < halfway < 0.9 * made  # bonds end before and after the restart
-    same(two, one, 1e-9)
+    same(two, one, 1e-12)
     again = dempm(after_restart(tmp_path / "one" / "half", 100), cwd=tmp_path / "again")
-    assert last(again) == last(one)
-    same(dempm(after_restart(tmp_path / "two" / "half", 100), cwd=tmp_path / "gathered"), one, 1e-9)
+    assert last(again) == last(one) == last(whole)
+    same(dempm(after_restart(tmp_path / "two" / "half", 100), cwd=tmp_path / "gathered"), one, 1e-12)
     for k in range(1, 8):
         for run in (two, again):
             assert run.table[f"f_bond[{k}]"][-1] == pytest.approx(one.table[f"f_bond[{k}]"][-1], rel=1e-9, abs=1e-15)
