@@ -189,25 +189,26 @@ void FixHeatGranGrain::find_walls() {
 
 void FixHeatGranGrain::keep_positions() {
   if (model_.indirect == GRAIN_INDIRECT_NONE) return;
-  built_.resize(3 * (size_t)atom->nlocal);
-  for (size_t k = 0; k < built_.size(); k++) built_[k] = atom->x[k / 3][k % 3];
+  built_.resize(4 * (size_t)atom->nlocal);
+  for (size_t k = 0; k < built_.size(); k++) built_[k] = k % 4 < 3 ? atom->x[k / 4][k % 4] : atom->radius[k / 4];
 }
 
 void FixHeatGranGrain::pre_force(int) {
   if (neighbor->ago == 0) keep_positions();
 }
 
-/* LIGGGHTS builds the list anew when a grain has moved by half the skin, which is early enough for contacts. Pairs
+/* LIGGGHTS builds the list anew when a grain has moved (or grown) by half the skin, which is early enough for contacts. Pairs
  * with a gap up to the reach need it once a grain has moved by half of what the skin has beyond the reach. */
 void FixHeatGranGrain::post_integrate() {
-  const size_t count = 3 * (size_t)atom->nlocal;
+  const size_t count = 4 * (size_t)atom->nlocal;
   double largest = built_.size() == count ? 0.0 : HUGE_VAL, all;
-  for (size_t k = 0; k + 2 < count && k + 2 < built_.size(); k += 3) {
-    const double *x = atom->x[k / 3], move[3] = {x[0] - built_[k], x[1] - built_[k + 1], x[2] - built_[k + 2]};
-    largest = fmax(largest, move[0] * move[0] + move[1] * move[1] + move[2] * move[2]);
+  for (size_t k = 0; k + 3 < count && k + 3 < built_.size(); k += 4) {
+    const double *x = atom->x[k / 4], move[3] = {x[0] - built_[k], x[1] - built_[k + 1], x[2] - built_[k + 2]};
+    const double growth = atom->radius[k / 4] - built_[k + 3];
+    largest = fmax(largest, sqrt(move[0] * move[0] + move[1] * move[1] + move[2] * move[2]) + growth);
   }
   MPI_Allreduce(&largest, &all, 1, MPI_DOUBLE, MPI_MAX, world);
-  if (2.0 * sqrt(all) > neighbor->skin - reach_) next_reneighbor = update->ntimestep;
+  if (2.0 * all > neighbor->skin - reach_) next_reneighbor = update->ntimestep;
 }
 
 /* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */

@@ -45,6 +45,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void pre_delete(bool);
   int n_history_extra();
   bool history_args(char **);
+  /* With `friction`: the tangential spring at the head of a contact's history was set, not grown by slip. */
+  void start_slip(double *history) const;
 
  private:
   enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, FLOWS };
@@ -60,7 +62,7 @@ class FixHeatGranGrain : public FixHeatGran {
   std::vector<double> capacity_;     /* J/(kg K), by atom type; with collisions */
   std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
-  std::vector<double> built_;        /* positions when the neighbour list was built */
+  std::vector<double> built_;        /* positions and radii when the neighbour list was built */
 
   void read_model(class KeywordParser &);
   void check_keywords(const class KeywordParser &) const;
