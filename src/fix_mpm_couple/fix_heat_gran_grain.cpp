@@ -178,13 +178,22 @@ void FixHeatGranGrain::initial_integrate(int vflag) {
   if (!walls_found_) find_walls();
 }
 
+/* LIGGGHTS' lists of a mesh hold what was nearer than half the skin when they were built. */
 void FixHeatGranGrain::find_walls() {
   walls_.take_over(this);
   walls_found_ = true;
-  if (model_.direct == GRAIN_DIRECT_NONE && !walls_.empty())
+  if (walls_.empty()) return;
+  if (model_.direct == GRAIN_DIRECT_NONE && model_.indirect == GRAIN_INDIRECT_NONE)
     fix_failed(lmp, this,
-               "'direct none': a wall (fix wall/gran) has a temperature, but only a direct model conducts at walls; "
-               "allowed are batchelor, liggghts and pipe");
+               "'direct none': a wall (fix wall/gran) has a temperature, but only a direct or an indirect model "
+               "conducts at walls; allowed are batchelor, liggghts and pipe, or an indirect model");
+  const double reach = walls_.has_mesh() ? 2.0 * grain_heat_wall_reach(&model_) * find_largest_radius() : 0.0;
+  if (neighbor->skin <= reach)
+    fix_failed(lmp, this,
+               format_text("the skin (command neighbor) is %g, but the indirect model reaches over gaps of %g at a mesh "
+                           "with a temperature: allowed is a number > twice that, %g",
+                           neighbor->skin, 0.5 * reach, reach));
+  reach_ = fmax(reach_, reach);
 }
 
 void FixHeatGranGrain::keep_positions() {
@@ -265,15 +274,21 @@ void FixHeatGranGrain::post_force(int) {
   }
 }
 
+double FixHeatGranGrain::find_wall_conductance(const WallContact &contact) const {
+  const int type = atom->type[contact.grain];
+  const double radius = atom->radius[contact.grain], k[2] = {conductivity_[type], conductivity_[contact.type]};
+  const double direct =
+      contact.touches ? grain_heat_wall_conductance(&model_, radius, k, contact.distance) : 0.0;
+  return contact.in_sight ? direct + grain_heat_wall_indirect(&model_, radius, k[0], contact.distance) : direct;
+}
+
 /* Here and not in post_force(): walls may come after this fix. */
 void FixHeatGranGrain::pre_final_integrate() {
   updatePtrs();
-  for (const WallContact &contact : walls_.find_contacts()) {
+  for (const WallContact &contact : walls_.find_contacts(grain_heat_wall_reach(&model_))) {
     const int i = contact.grain;
     if (!(atom->mask[i] & groupbit)) continue;
-    const double k[2] = {conductivity_[atom->type[i]], conductivity_[contact.type]};
-    const double h = grain_heat_wall_conductance(&model_, atom->radius[i], k, contact.distance);
-    const double flow = h * (contact.temperature - Temp[i]);
+    const double flow = find_wall_conductance(contact) * (contact.temperature - Temp[i]);
     heatFlux[i] += flow;
     flow_[WALLS].add(flow);
   }

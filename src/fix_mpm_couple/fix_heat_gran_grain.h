@@ -74,6 +74,7 @@ class FixHeatGranGrain : public FixHeatGran {
   void heat_by_friction();
   void slip(int i, int j, double *history);
   void find_walls();
+  double find_wall_conductance(const WallContact &contact) const;
   void keep_positions();
   void check_radiation(const class KeywordParser &) const;
   void exchange(int i, int j, double *record);

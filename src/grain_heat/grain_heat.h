@@ -68,6 +68,8 @@ double grain_indirect_voronoi_b(const GrainPair *pair, double face, double fluid
 /* Surrounding layer (table 2, corrected: factor k_f; R_e at most the smaller radius): the larger grain carries a layer
  * of fluid of thickness layer * R; minimum_gap > 0, m, bounds the length of a path from below. Closed form. */
 double grain_indirect_layer(const GrainPair *pair, double fluid, double layer, double minimum_gap);
+/* The same between a grain, which carries the layer, and a plane at `distance` (> 0) from its centre, m. */
+double grain_indirect_layer_wall(double radius, double distance, double fluid, double layer, double minimum_gap);
 
 /* --------------------------------------------------------------------------------------------------- model */
 typedef enum GrainArea { GRAIN_AREA_GEOMETRIC, GRAIN_AREA_HERTZ } GrainArea;
@@ -108,11 +110,15 @@ double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
  * 5, where the published fit ends and conduction is nearly steady. */
 double grain_heat_impact_conductance(const GrainHeat *model, const GrainPair *pair, const GrainImpact *impact,
                                      double age, double step);
-/* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m; h = 0 for indirect models. The
- * wall is the limit of a grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its
- * surface. */
+/* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m. The wall is the limit of a
+ * grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its surface. */
 double grain_heat_wall_conductance(const GrainHeat *model, double radius, const double conductivity[2],
                                    double distance);
+/* Of the indirect model between a grain of the given conductivity and the surface of a wall, which is isothermal, W/K.
+ * The Voronoi models: half of the way to the mirror image of the grain, hence twice the h of that pair. */
+double grain_heat_wall_indirect(const GrainHeat *model, double radius, double conductivity, double distance);
+/* Gap between a grain and a wall, in radii of the grain, from which on grain_heat_wall_indirect is 0. */
+double grain_heat_wall_reach(const GrainHeat *model);
 /* Smallest gap between surfaces, m, from which on h = 0 for every pair of grains no larger than `radius`; 0 without an
  * indirect model. */
 double grain_heat_reach(const GrainHeat *model, double radius);

@@ -5,7 +5,6 @@ import math
 import random
 
 import pytest
-from test_surface_walls import quad, stl
 from test_with_grains import GRAINS, PAIR, POINTS
 
 HEAD = """
@@ -256,66 +255,6 @@ def test_restart_continues(before, after, dempm, tmp_path):
     again = dempm(HEAD.format(boundary="p p f") + f"read_restart {tmp_path}/through/half\n" + properties(fix) + fix +
                   OUTPUT.format(every=200) + "run 200\n", np=after, cwd=tmp_path / "again")
     assert deviation(again, through) < (1e-15 if before == after else 1e-13)
-
-
-# ------------------------------------------------------------------------------------------------------- walls
-PLANE = "fix floor all wall/gran model hertz tangential history primitive type 2 zplane 0.0 temperature 500\n"
-MESH = """fix plate all mesh/surface file plate.stl type 2 temperature 500
-fix floor all wall/gran model hertz tangential history mesh n_meshes 1 meshes plate
-"""
-FILES = {"plate.stl": stl(*quad((0, 0, 0), (0.06, 0, 0), (0.06, 0.06, 0), (0, 0.06, 0)))}
-BIG = {"plate.stl": stl(*quad((-0.01, -0.01, 0), (0.08, -0.01, 0), (0.08, 0.08, 0), (-0.01, 0.08, 0)))}
-LYING = [(1, 0.005, 0.03, 0.03, 0.0049, 300.0), (1, 0.004, 0.02, 0.04, 0.0039, 300.0)]  # the second off the diagonal
-
-
-def lying(words, wall, steps=1):
-    """Two grains that overlap with a floor and do not move."""
-    make, heat = grains(LYING)
-    fix = f"fix heat all heat/gran/grain initial_temperature 300 {words}\n"
-    output = OUTPUT.replace("thermo 1000", "thermo 1").replace("f_heat\n", "f_heat f_heat[3]\n")
-    return (box((0, 0, -0.001), (0.06, 0.06, 0.06), "f f f") + make + properties(fix) + fix + wall + heat +
-            output.format(every=1) + f"run {steps}\n")
-
-
-@pytest.mark.parametrize("wall", [PLANE, MESH], ids=["plane", "mesh"])
-@pytest.mark.parametrize("words, conductance", [
-    ("direct batchelor", lambda r, d: 4 * 20 * 90 / 110 * math.sqrt(r * r - d * d)),
-    ("direct batchelor area hertz", lambda r, d: 4 * 20 * 90 / 110 * math.sqrt(r * (r - d))),
-    ("direct liggghts", lambda r, d: 4 * 20 * 90 / 110 * math.sqrt(math.pi * (r * r - d * d))),
-    ("direct pipe", lambda r, d: math.pi * (r * r - d * d) * 20 / d),
-], ids=["batchelor", "hertz", "liggghts", "pipe"])
-def test_walls_conduct_by_the_model(words, conductance, wall, dempm):
-    """One grain lies on the edge between both triangles: they count once."""
-    run = dempm(lying(words, wall), files=FILES)
-    flows = [conductance(row[1], row[4]) * 200.0 for row in LYING]
-    assert last(run, "f_heatFlux[0]") == pytest.approx(flows, rel=1e-10)
-    assert run.table["f_heat[3]"][-1] == pytest.approx(sum(flows), rel=1e-10)
-
-
-def falling_on(wall, fix):
-    return falling(fix, 5000).replace("fix floor all wall/gran model hertz tangential history primitive type 1 zplane "
-                                      "0.0 temperature 500\n", wall)
-
-
-def test_meshes_conduct_as_in_the_stock_fix(dempm, liggghts, tmp_path):
-    ours, two = (dempm(falling_on(MESH, OURS), np=np, files=BIG, cwd=tmp_path / str(np)) for np in (1, 2))
-    stock = liggghts(falling_on(MESH, STOCK), files=BIG, cwd=tmp_path / "stock")
-    unheated = dempm(falling_on(MESH.replace(" temperature 500", ""), OURS), files=BIG, cwd=tmp_path / "unheated")
-    assert deviation(unheated, stock) > 0.01
-    assert last(ours, "z") == last(stock, "z")
-    assert deviation(ours, stock) < 1e-10 and deviation(two, ours) < 1e-10
-
-
-@pytest.mark.parametrize("wall", [PLANE, MESH], ids=["plane", "mesh"])
-def test_heat_of_walls_adds_up_over_several_runs(wall, dempm):
-    """LIGGGHTS takes up its own conduction to walls again whenever a run begins."""
-    run = dempm(lying("direct batchelor", wall, 20) + "run 0\nrun 20\n", files=FILES)
-    for table in (run.thermo[-3], run.thermo[-1]):
-        energy, flow = table["f_heat"], table["f_heat[3]"]
-        assert len(energy) == 21
-        for n in range(1, 21):
-            assert energy[n] - energy[n - 1] == pytest.approx(2e-5 * flow[n], abs=1e-12 * energy[0])
-            assert flow[n] > 0.0
 
 
 # ------------------------------------------------------------------------------------------------ surroundings
