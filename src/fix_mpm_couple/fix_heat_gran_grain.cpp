@@ -35,6 +35,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
       model_(grain_heat_default()),
       surface_{},
       friction_(false),
+      correction_(false),
       walls_(lammps),
       walls_found_(false),
       reach_(0.0) {
@@ -42,8 +43,9 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
   size_vector = FLOWS;
   extvector = 1;
   KeywordParser parser(lmp, this, narg, arg, 3,
-                       {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
-                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero", "friction"});
+                       {"initial_temperature", "direct", "area", "area_correction", "indirect", "fluid", "porosity",
+                        "core", "reach", "layer", "minimum_gap", "convection", "radiation", "absolute_zero",
+                        "friction"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
@@ -63,6 +65,7 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("direct"))
       model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe", "collisional"});
     else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
+    else if (parser.is("area_correction")) correction_ = parser.yes_no();
     else if (parser.is("indirect"))
       model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
     else if (parser.is("fluid")) model_.fluid = parser.number(NumberRange::positive());
@@ -104,10 +107,12 @@ void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
 /* A keyword that the model does not use is a mistake in the script. */
 void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   const GrainIndirect a = GRAIN_INDIRECT_VORONOI_A, b = GRAIN_INDIRECT_VORONOI_B, layer = GRAIN_INDIRECT_LAYER;
+  const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
   const struct {
     const char *keyword, *models;
     bool used;
-  } uses[] = {{"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
+  } uses[] = {{"area_correction", "a direct or an indirect model", conducts},
+              {"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
               {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
               {"porosity", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
               {"reach", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
@@ -139,7 +144,33 @@ void FixHeatGranGrain::init() {
   }
   check_skin();
   FixHeatGran::init();
+  init_area_correction();
   init_history();
+}
+
+/* As in LIGGGHTS' fix heat/gran/conduction: at the same force the overlap goes as E*^(-1/exponent), force ~ E*
+ * overlap^exponent. */
+void FixHeatGranGrain::init_area_correction() {
+  if (!correction_) return;
+  const size_t types = conductivity_.size();
+  std::vector<double> soft(types, 0.0), real(types, 0.0); /* (1 - nu^2) / E */
+  for (int type = 1; type < (int)types; type++) {
+    const MaterialProperties properties(lmp, this, type);
+    const double ratio = properties.of_type("poissonsRatio", NumberRange::from_below(0.0, 1.0));
+    soft[type] = (1.0 - ratio * ratio) / properties.of_type("youngsModulus", NumberRange::positive());
+    real[type] = (1.0 - ratio * ratio) / properties.of_type("youngsModulusOriginal", NumberRange::positive());
+  }
+  overlap_ratio_.assign(types * types, 1.0);
+  for (size_t a = 1; a < types; a++)
+    for (size_t b = 1; b < types; b++)
+      overlap_ratio_[a * types + b] =
+          pow((real[a] + real[b]) / (soft[a] + soft[b]), 1.0 / pair_gran->stressStrainExponent());
+}
+
+/* Distance of the centres, or of a centre from a wall (sum: its radius), with the overlap of the real stiffness. */
+double FixHeatGranGrain::find_real_distance(double distance, double sum, int type, int other) const {
+  if (!correction_ || distance >= sum) return distance;
+  return sum - (sum - distance) * overlap_ratio_[type * conductivity_.size() + other];
 }
 
 /* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
@@ -224,9 +255,10 @@ void FixHeatGranGrain::exchange(int i, int j, double *record) {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
   const int *type = atom->type;
+  const double distance = sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2]);
   const GrainPair pair = {{atom->radius[i], atom->radius[j]},
                           {conductivity_[type[i]], conductivity_[type[j]]},
-                          sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
+                          find_real_distance(distance, atom->radius[i] + atom->radius[j], type[i], type[j])};
   const double conductance = record ? collide(i, j, pair, record) : grain_heat_conductance(&model_, &pair);
   if (conductance == 0.0) return;
   const double flow = (Temp[j] - Temp[i]) * conductance;
@@ -277,9 +309,9 @@ void FixHeatGranGrain::post_force(int) {
 double FixHeatGranGrain::find_wall_conductance(const WallContact &contact) const {
   const int type = atom->type[contact.grain];
   const double radius = atom->radius[contact.grain], k[2] = {conductivity_[type], conductivity_[contact.type]};
-  const double direct =
-      contact.touches ? grain_heat_wall_conductance(&model_, radius, k, contact.distance) : 0.0;
-  return contact.in_sight ? direct + grain_heat_wall_indirect(&model_, radius, k[0], contact.distance) : direct;
+  const double distance = find_real_distance(contact.distance, radius, type, contact.type);
+  const double direct = contact.touches ? grain_heat_wall_conductance(&model_, radius, k, distance) : 0.0;
+  return contact.in_sight ? direct + grain_heat_wall_indirect(&model_, radius, k[0], distance) : direct;
 }
 
 /* Here and not in post_force(): walls may come after this fix. */

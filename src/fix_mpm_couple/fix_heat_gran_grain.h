@@ -22,7 +22,7 @@ namespace LAMMPS_NS {
 /* Heat conduction between the particles of a group (pair_style gran), in place of LIGGGHTS' fix heat/gran/conduction.
  *
  *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe|collisional
- *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
+ *       [area geometric|hertz] [area_correction yes|no] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
  *       [layer F] [minimum_gap S]
  *       [convection H T] [radiation EMISSIVITY T] [absolute_zero Z]
  *       [friction yes|no]
@@ -51,7 +51,7 @@ class FixHeatGranGrain : public FixHeatGran {
 
   GrainHeat model_;
   GrainSurface surface_;
-  bool convection_, radiation_, friction_;
+  bool convection_, radiation_, friction_, correction_;
   DoubleSum flow_[FLOWS];            /* W, this rank's part */
   HeatWalls walls_;
   bool walls_found_;                 /* in this run */
@@ -59,6 +59,7 @@ class FixHeatGranGrain : public FixHeatGran {
   std::vector<double> stiffness_;    /* of the tangential springs by pair of types, N/m; with friction */
   std::vector<double> capacity_;     /* J/(kg K), by atom type; with collisions */
   std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
+  std::vector<double> overlap_ratio_; /* real by simulated overlap, by pair of types; with area_correction */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
   std::vector<double> built_;        /* positions when the neighbour list was built */
 
@@ -66,6 +67,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
+  void init_area_correction();
+  double find_real_distance(double distance, double sum, int type, int other) const;
   bool collides() const { return model_.direct == GRAIN_DIRECT_COLLISIONAL; }
   void init_history();
   void init_friction();

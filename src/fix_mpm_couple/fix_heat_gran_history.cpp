@@ -104,7 +104,8 @@ void FixHeatGranGrain::init_collisions() {
     const MaterialProperties properties(lmp, this, type);
     const double ratio = properties.of_type("poissonsRatio", NumberRange::from_below(0.0, 1.0));
     capacity_[type] = properties.of_type("thermalCapacity", NumberRange::positive());
-    compliance_[type] = (1.0 - ratio * ratio) / properties.of_type("youngsModulus", NumberRange::positive());
+    const char *modulus = correction_ ? "youngsModulusOriginal" : "youngsModulus";
+    compliance_[type] = (1.0 - ratio * ratio) / properties.of_type(modulus, NumberRange::positive());
   }
 }
 

@@ -137,6 +137,24 @@ def test_liggghts_variant_is_the_stock_fix(scene, dempm, liggghts, tmp_path):
         assert last(ours, "z") == last(stock, "z")
 
 
+@pytest.mark.parametrize("model", ["hertz", "hooke"])
+def test_area_correction_is_that_of_the_stock_fix(model, dempm, liggghts, tmp_path):
+    """Grains and floor of other real stiffnesses than those simulated."""
+    real = "fix m0 all property/global youngsModulusOriginal peratomtype 6e8 5e7\n"
+    if model == "hooke":
+        real += "fix m5 all property/global characteristicVelocity scalar 1\n"
+
+    def script(fix):
+        return falling(real + fix, 5000).replace("model hertz", f"model {model}")
+
+    ours, plain = (dempm(script(OURS.replace("liggghts", f"liggghts area_correction {word}")), cwd=tmp_path / word)
+                   for word in ("yes", "no"))
+    stock = liggghts(script(STOCK.replace("300", "300 area_correction yes")), cwd=tmp_path / "stock")
+    assert deviation(plain, stock) > 0.01
+    assert last(ours, "z") == last(stock, "z")
+    assert deviation(ours, stock) < 1e-10
+
+
 # ------------------------------------------------------------------------------------------------ two grains
 def circle(a, b, d):
     return math.sqrt(a * a - ((a * a - b * b + d * d) / (2 * d)) ** 2)
@@ -151,6 +169,18 @@ def circle(a, b, d):
 def test_flow_between_two_grains(words, conductance, dempm):
     run = dempm(two_grains(f"fix heat all heat/gran/grain initial_temperature 300 {words}\n", 1))
     flow = conductance(0.005, 0.004, 0.0089) * (250.0 - 350.0)
+    assert last(run, "f_heatFlux[0]") == pytest.approx([flow, -flow], rel=1e-10)
+
+
+@pytest.mark.parametrize("area, radius", [("geometric", circle), ("hertz", lambda a, b, d: math.sqrt(
+    a * b / (a + b) * (a + b - d)))])
+def test_overlaps_are_corrected_for_a_softened_modulus(area, radius, dempm):
+    """At the same force Hertz' overlap goes as E*^(-2/3)."""
+    real = "fix m0 all property/global youngsModulusOriginal peratomtype 25e6 1e9\n"
+    fix = f"fix heat all heat/gran/grain initial_temperature 300 direct batchelor area {area} area_correction yes\n"
+    ratio = ((1 / 25e6 + 1 / 1e9) / (2 / 5e6)) ** (2 / 3)
+    run = dempm(two_grains(real + fix, 1))
+    flow = 4 * 20 * 90 / 110 * radius(0.005, 0.004, 0.009 - 0.0001 * ratio) * (250.0 - 350.0)
     assert last(run, "f_heatFlux[0]") == pytest.approx([flow, -flow], rel=1e-10)
 
 
