@@ -6,6 +6,7 @@
 #include "atom.h"
 #include "fix_contact_history.h"
 #include "fix_heat_gran_grain.h"
+#include "fix_scalar_transport_equation.h"
 #include "keyword_parser.h"
 #include "material_properties.h"
 #include "neigh_list.h"
@@ -35,6 +36,10 @@ bool FixHeatGranGrain::history_args(char **args) {
 /* LIGGGHTS' history of contacts keeps the size that it had in the first run, but pair styles expect that of the fixes
  * which are there: without this fix they would read beyond it. */
 void FixHeatGranGrain::pre_delete(bool unfix) {
+  if (unfix && capacity_table_ && fix_ste) {
+    char integrate[] = "integrate", start[] = "start", *words[] = {integrate, start};
+    fix_ste->modify_param(2, words);
+  }
   if (unfix && (stiffness_.size() > 0 || compliance_.size() > 0))
     fix_failed(lmp, this,
                "with 'friction yes' or 'direct collisional' the fix cannot be removed after the first run");
@@ -126,7 +131,8 @@ double FixHeatGranGrain::collide(int i, int j, const GrainPair &pair, double *re
   for (int g = 0; g < 2; g++) {
     const int type = atom->type[grains[g]];
     mass[g] = atom->rmass[grains[g]];
-    impact.heat_capacity[g] = mass[g] * capacity_[type] / (4.0 / 3.0 * M_PI * pow(pair.radius[g], 3));
+    const double density = mass[g] / (4.0 / 3.0 * M_PI * pow(pair.radius[g], 3));
+    impact.heat_capacity[g] = density * find_capacity(type, Temp[grains[g]]);
     compliance += compliance_[type];
   }
   grain_impact_hertz(&pair, mass, 1.0 / compliance, record[1], &impact.radius_max, &impact.duration);

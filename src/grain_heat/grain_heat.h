@@ -151,6 +151,19 @@ double grain_convection(const GrainSurface *exchange, double radius, double temp
  * large. */
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature);
 
+/* Two grains that see each other through the Voronoi face between them, a circle of radius `face`; or a grain (0) and a
+ * plane. Seen from either centre the face bounds a cap of the surface, without the contact. The smaller cap sees the
+ * other one alone: the enclosure of two grey surfaces of heat transfer textbooks, 1/G = 1/A_min + (1 - e)/e (1/A0 +
+ * 1/A1). Radiation beyond the nearest neighbours is left out. */
+typedef struct GrainView {
+  double area;     /* G, m2 */
+  double share[2]; /* of the surface of each grain that the face takes, 0 to 1, with the contact; [1] of a plane: 0 */
+} GrainView;
+GrainView grain_view(const GrainPair *pair, double face, double emissivity);
+GrainView grain_view_wall(double radius, double distance, double face, double emissivity);
+/* Into grain 0: sigma G (T1^4 - T0^4), absolute temperatures, W; the opposite to the last bit if both change places. */
+double grain_radiation_between(double area, const double temperature[2], double absolute_zero);
+
 #ifdef __cplusplus
 }
 #endif

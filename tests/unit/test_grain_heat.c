@@ -449,52 +449,6 @@ static void impacts_end_in_steady_conduction(void **state) {
   assert_true(grain_heat_impact_conductance(&model, &pair, &impact, 0.0, 1e-4) == steady);
 }
 
-/* ---------------------------------------------------------------------------------------------------- slip */
-/* Grain 0 above grain 1; it moves along x at 2 m/s, and its spin takes 1 m/s of that off at the point of contact. */
-static void slip_work_is_force_times_slip(void **state) {
-  (void)state;
-  const double k = 1000.0, dt = 1e-5, before[3] = {3e-6, 0, 0}, after[3] = {4e-6, 0, 0}, same[3] = {1.3e-5, 0, 0};
-  const GrainMotion motion = {.radius = {0.5, 0.25},
-                              .branch = {0, 0, 0.75},
-                              .velocity = {{2, 0, 7}, {0, 0, 0}},
-                              .spin = {{0, 2, 5}, {0, 0, 0}}};
-  double worst = 0.0;
-  note(&worst, grain_slip_work(&motion, k, dt, before, after), k * 3.5e-6 * (3e-6 + 1e-5 - 4e-6));
-  AT_MOST(worst, 1e-14);
-  assert_true(grain_slip_work(&motion, k, dt, before, same) == 0.0); /* the spring takes it all: no slip */
-  const GrainMotion other = {.radius = {0.25, 0.5},
-                             .branch = {0, 0, -0.75},
-                             .velocity = {{0, 0, 0}, {2, 0, 7}},
-                             .spin = {{0, 0, 0}, {0, 2, 5}}};
-  const double before2[3] = {-3e-6, 0, 0}, after2[3] = {-4e-6, 0, 0};
-  worst = 0.0;
-  note(&worst, grain_slip_work(&other, k, dt, before2, after2), grain_slip_work(&motion, k, dt, before, after));
-  AT_MOST(worst, 1e-14);
-}
-
-/* ------------------------------------------------------------------------------------------------- surface */
-static void surfaces_exchange_heat_by_newton_and_stefan_boltzmann(void **state) {
-  (void)state;
-  const GrainSurface kelvin = {
-      .coefficient = 25.0, .fluid_temperature = 300.0, .emissivity = 0.8, .surroundings = 400.0};
-  const double area = 4.0 * PI * 0.01 * 0.01;
-  double worst = 0.0;
-  note(&worst, grain_convection(&kelvin, 0.01, 350.0), -25.0 * area * 50.0);
-  note(&worst, grain_radiation(&kelvin, 0.01, 500.0), -0.8 * area * 5.670374419e-8 * (625e8 - 256e8));
-  note(&worst, grain_radiation(&kelvin, 0.01, 0.0), 0.8 * area * 5.670374419e-8 * 256e8);
-  /* Near equilibrium: 4 T^3 dT to first order. */
-  const double small = ldexp(1.0, -20);
-  note(&worst, grain_radiation(&kelvin, 0.01, 400.0 - small) / (0.8 * area * 5.670374419e-8),
-       4.0 * 64e6 * small * (1.0 - 1.5 * small / 400.0));
-  AT_MOST(worst, 1e-14);
-  assert_true(grain_radiation(&kelvin, 0.01, 400.0) == 0.0 && grain_convection(&kelvin, 0.01, 300.0) == 0.0);
-  /* The same on the scale of Celsius. */
-  const GrainSurface celsius = {.emissivity = 0.8, .surroundings = 400.0 - 273.15, .absolute_zero = -273.15};
-  worst = 0.0;
-  note(&worst, grain_radiation(&celsius, 0.01, 500.0 - 273.15), grain_radiation(&kelvin, 0.01, 500.0));
-  AT_MOST(worst, 1e-14);
-}
-
 /* --------------------------------------------------------------------------------------------------- walls */
 static void a_wall_is_a_grain_of_infinite_radius(void **state) {
   (void)state;
@@ -532,8 +486,6 @@ int main(void) {
       cmocka_unit_test(wrong_models_are_refused),
       cmocka_unit_test(a_wall_is_a_grain_of_infinite_radius),
       cmocka_unit_test(impacts_end_in_steady_conduction),
-      cmocka_unit_test(slip_work_is_force_times_slip),
-      cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
