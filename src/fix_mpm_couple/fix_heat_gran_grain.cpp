@@ -38,11 +38,13 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
       radiation_(false),
       neighbours_(false),
       friction_(false),
+      damping_(false),
       correction_(false),
       conductivity_table_(false),
       capacity_table_(false),
       walls_(lammps),
       walls_found_(false),
+      law_(HOOKE_STIFFNESS),
       reach_(0.0) {
   vector_flag = 1;
   size_vector = FLOWS;
@@ -50,7 +52,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
   KeywordParser parser(lmp, this, narg, arg, 3,
                        {"initial_temperature", "direct", "area", "area_correction", "indirect", "fluid", "porosity",
                         "core", "reach", "layer", "minimum_gap", "convection", "radiation", "absolute_zero",
-                        "conductivity", "capacity", "friction"});
+                        "conductivity", "capacity", "friction", "damping"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
@@ -92,6 +94,7 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("conductivity")) conductivity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("capacity")) capacity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("friction")) friction_ = parser.yes_no();
+    else if (parser.is("damping")) damping_ = parser.yes_no();
   }
 }
 
@@ -133,6 +136,7 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   for (const auto &use : uses)
     if (parser.given(use.keyword) && !use.used)
       parser.fail(std::string("keyword '") + use.keyword + "' has a meaning with " + use.models + " only");
+  if (damping_ && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
   if (model_.indirect != GRAIN_INDIRECT_NONE) parser.require("fluid", "fluid K, the conductivity of the fluid");
 }
 
@@ -234,8 +238,8 @@ void FixHeatGranGrain::find_walls() {
   const double reach = walls_.has_mesh() ? 2.0 * find_wall_reach() * find_largest_radius() : 0.0;
   if (neighbor->skin <= reach)
     fix_failed(lmp, this,
-               format_text("the skin (command neighbor) is %g, but the indirect model or radiation reaches over gaps of "
-                           "%g at a mesh with a temperature: allowed is a number > twice that, %g",
+               format_text("the skin (command neighbor) is %g, but the indirect model or radiation reaches over gaps "
+                           "of %g at a mesh with a temperature: allowed is a number > twice that, %g",
                            neighbor->skin, 0.5 * reach, reach));
   reach_ = fmax(reach_, reach);
 }
@@ -333,7 +337,7 @@ void FixHeatGranGrain::post_force(int) {
   if (neighbours_) hidden_.assign(atom->nlocal, 0.0);
   if (friction_) heat_by_friction();
   const NeighList *list = pair_gran->list;
-  const int impact = collides() ? pair_gran->fix_extra_dnum_index(this) + (friction_ ? 3 : 0) : 0;
+  const int impact = collides() ? pair_gran->fix_extra_dnum_index(this) + (friction_ ? 4 : 0) : 0;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];
     for (int k = 0; k < list->numneigh[i]; k++) {

@@ -27,11 +27,11 @@ namespace LAMMPS_NS {
  *       [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F] [layer F] [minimum_gap S]
  *       [convection H T] [radiation EMISSIVITY T|none [neighbours]] [absolute_zero Z]
  *       [conductivity constant|table] [capacity constant|table]
- *       [friction yes|no]
+ *       [friction yes|no] [damping yes|no]
  *
  * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that
  * integrates Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows into the group in the last step,
- * W: convection, radiation, walls, friction. */
+ * W: convection, radiation, walls, friction, damping. */
 class FixHeatGranGrain : public FixHeatGran {
  public:
   FixHeatGranGrain(class LAMMPS *, int, char **);
@@ -51,19 +51,21 @@ class FixHeatGranGrain : public FixHeatGran {
   bool history_args(char **);
 
  private:
-  enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, FLOWS };
+  enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, DAMPING, FLOWS };
+  enum Law { HOOKE_STIFFNESS, HERTZ, HERTZ_STIFFNESS }; /* normal models of the pair style */
 
   GrainHeat model_;
   GrainSurface surface_;
   bool convection_, radiation_;      /* to the surroundings */
   bool neighbours_;                  /* radiation between grains, and to walls of given temperature */
-  bool friction_, correction_;
+  bool friction_, damping_, correction_;
   bool conductivity_table_, capacity_table_;
   DoubleSum flow_[FLOWS];            /* W, this rank's part */
   HeatWalls walls_;
   bool walls_found_;                 /* in this run */
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
-  std::vector<double> stiffness_;    /* of the tangential springs by pair of types, N/m; with friction */
+  Law law_;                          /* with friction */
+  std::vector<GrainContact> laws_;   /* by pair of types, with friction: factors of find_contact(); mass is unused */
   std::vector<double> capacity_;     /* J/(kg K), by atom type; with collisions */
   std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
   std::vector<double> overlap_ratio_; /* real by simulated overlap, by pair of types; with area_correction */
@@ -89,6 +91,8 @@ class FixHeatGranGrain : public FixHeatGran {
   bool collides() const { return model_.direct == GRAIN_DIRECT_COLLISIONAL; }
   void init_history();
   void init_friction();
+  GrainContact read_law(int type, int other) const;
+  GrainContact find_contact(int i, int j, double overlap) const;
   void init_collisions();
   double collide(int i, int j, const GrainPair &pair, double *record) const;
   void heat_by_friction();

@@ -41,9 +41,6 @@ void FixHeatGranGrain::init_capacity() {
   const GrainTable table = make_table(capacity_rows_);
   if (grain_table_check(&table, true) != BASE_OK)
     fix_failed(lmp, this, std::string("property 'thermalCapacityTable': ") + base_error_message());
-  if (fix_ste->n_every() != 1)
-    fix_failed(lmp, this, format_text("'capacity table': fix_modify %s every %d is given, allowed is 1", fix_ste->id,
-                                      fix_ste->n_every()));
   char integrate[] = "integrate", stop[] = "stop", *words[] = {integrate, stop};
   fix_ste->modify_param(2, words);
 }

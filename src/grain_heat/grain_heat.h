@@ -129,13 +129,23 @@ double grain_heat_reach(const GrainHeat *model, double radius);
 typedef struct GrainMotion {
   double radius[2], branch[3], velocity[2][3], spin[2][3];
 } GrainMotion;
-/* Work of friction in a step of duration `step`, J. The tangential spring, of the given stiffness (N/m), goes from
- * `before` by the grains' motion to a trial state, which the Coulomb limit shortens to `after`, m: mean force times
- * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not
- * keep the spring. (Negative only in a step in which the slip turns back by more than the spring is long.) With
- * `before` and `after` negated the same for the grains in the other order. */
-double grain_slip_work(const GrainMotion *motion, double stiffness, double step, const double before[3],
+/* Springs (N/m) and dashpots (N s/m) of the contact at its overlap, normal and tangential, and the effective mass,
+ * kg. */
+typedef struct GrainContact {
+  double stiffness[2], damping[2], mass;
+} GrainContact;
+/* Work of friction in a step of duration `step`, J. The tangential spring goes from `before` by the grains' motion to a
+ * trial state, which the Coulomb limit shortens to `after`, m: mean force times slip, nothing where the limit is not
+ * reached. Its stiffness goes from stiffness[0] to stiffness[1], N/m: what the spring loses by that counts, too (< 0
+ * where it gains). That is what velocity Verlet takes from the grains' motion and does not keep in the spring. (Slip
+ * work is negative only in a step in which the slip turns back by more than the spring is long.) With `before` and
+ * `after` negated the same for the grains in the other order. */
+double grain_slip_work(const GrainMotion *motion, const double stiffness[2], double step, const double before[3],
                        const double after[3]);
+/* Work of the dashpots in the step, J, with the velocities half-way between those of the motion and the next ones; the
+ * tangential dashpot rests while the contact slips. */
+double grain_damping_work(const GrainMotion *motion, const GrainContact *contact, double step, const double before[3],
+                          const double after[3]);
 
 /* ------------------------------------------------------------------------------------------------- surface */
 /* What a grain exchanges with its surroundings over its whole surface, 4 pi R^2. Temperatures on the scale of the

@@ -4,9 +4,9 @@ import math
 
 import pytest
 from scipy.integrate import quad as integrate
-from test_grain_heat import (FLOWS, HEAD, INDIRECT, OUTPUT, PAIR_ROWS, alone, area_over_capacity, circle, deviation, last,
-                             properties, still, two_grains)
-from test_grain_heat_walls import MESH, FILES, PLANE, over
+from test_grain_heat import (FLOWS, HEAD, INDIRECT, OUTPUT, PAIR_ROWS, alone, area_over_capacity, circle, deviation,
+                             last, properties, still, two_grains)
+from test_grain_heat_walls import FILES, MESH, PLANE, over
 
 SIGMA = 5.670374419e-8
 
@@ -95,8 +95,8 @@ def test_restart_continues(dempm, tmp_path):
     through = dempm(script, cwd=tmp_path / "through")
     extra, words, _ = CASES["all"]
     fix = extra + f"fix heat all heat/gran/grain initial_temperature 300 {words}\n"
-    again = dempm(HEAD.format(boundary="p p f") + f"read_restart {tmp_path}/through/half\n" + properties(fix, 0.0035) + fix +
-                  OUTPUT.format(every=100) + "run 100\n", cwd=tmp_path / "again")
+    again = dempm(HEAD.format(boundary="p p f") + f"read_restart {tmp_path}/through/half\n" +
+                  properties(fix, 0.0035) + fix + OUTPUT.format(every=100) + "run 100\n", cwd=tmp_path / "again")
     assert last(again, "f_Temp[0]") == last(through, "f_Temp[0]")
 
 

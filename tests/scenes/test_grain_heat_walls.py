@@ -41,8 +41,8 @@ def test_walls_conduct_by_the_model(words, conductance, wall, dempm):
 
 
 def falling_on(wall, fix, skin=None, steps=5000):
-    return falling(fix, steps, skin).replace("fix floor all wall/gran model hertz tangential history primitive type 1 zplane "
-                                      "0.0 temperature 500\n", wall)
+    floor = "fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.0 temperature 500\n"
+    return falling(fix, steps, skin).replace(floor, wall)
 
 
 def test_meshes_conduct_as_in_the_stock_fix(dempm, liggghts, tmp_path):

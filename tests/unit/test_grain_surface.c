@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Heat of single grains and contacts other than conduction: slip, surroundings, radiation between neighbours; tables. */
+/* Heat of grains and contacts other than conduction: slip, damping, surroundings, radiation between neighbours; tables. */
 #include "mpm_help.h"
 
 #include "grain_heat/grain_heat.h"
@@ -15,23 +15,41 @@ static void note(double *worst, double a, double b) {
 /* Grain 0 above grain 1; it moves along x at 2 m/s, and its spin takes 1 m/s of that off at the point of contact. */
 static void slip_work_is_force_times_slip(void **state) {
   (void)state;
-  const double k = 1000.0, dt = 1e-5, before[3] = {3e-6, 0, 0}, after[3] = {4e-6, 0, 0}, same[3] = {1.3e-5, 0, 0};
+  const double k = 1000.0, constant[2] = {k, k}, dt = 1e-5;
+  const double before[3] = {3e-6, 0, 0}, after[3] = {4e-6, 0, 0}, same[3] = {1.3e-5, 0, 0};
   const GrainMotion motion = {.radius = {0.5, 0.25},
                               .branch = {0, 0, 0.75},
                               .velocity = {{2, 0, 7}, {0, 0, 0}},
                               .spin = {{0, 2, 5}, {0, 0, 0}}};
   double worst = 0.0;
-  note(&worst, grain_slip_work(&motion, k, dt, before, after), k * 3.5e-6 * (3e-6 + 1e-5 - 4e-6));
+  note(&worst, grain_slip_work(&motion, constant, dt, before, after), k * 3.5e-6 * (3e-6 + 1e-5 - 4e-6));
   AT_MOST(worst, 1e-14);
-  assert_true(grain_slip_work(&motion, k, dt, before, same) == 0.0); /* the spring takes it all: no slip */
+  assert_true(grain_slip_work(&motion, constant, dt, before, same) == 0.0); /* the spring takes it all: no slip */
   const GrainMotion other = {.radius = {0.25, 0.5},
                              .branch = {0, 0, -0.75},
                              .velocity = {{0, 0, 0}, {2, 0, 7}},
                              .spin = {{0, 0, 0}, {0, 2, 5}}};
   const double before2[3] = {-3e-6, 0, 0}, after2[3] = {-4e-6, 0, 0};
   worst = 0.0;
-  note(&worst, grain_slip_work(&other, k, dt, before2, after2), grain_slip_work(&motion, k, dt, before, after));
+  note(&worst, grain_slip_work(&other, constant, dt, before2, after2),
+       grain_slip_work(&motion, constant, dt, before, after));
   AT_MOST(worst, 1e-14);
+  /* A spring that is held while its stiffness falls loses energy. */
+  const GrainMotion still = {.radius = {0.5, 0.25}, .branch = {0, 0, 0.75}};
+  assert_true(fabs(grain_slip_work(&still, (double[]){k, 0.25 * k}, dt, before, before) - 0.375 * k * 9e-12) < 1e-20);
+}
+
+/* Dashpots: power = c v (v + acceleration dt / 2). Parting at 3 m/s, sliding at 1 m/s. */
+static void dashpots_work_at_the_mean_velocity(void **state) {
+  (void)state;
+  const GrainContact contact = {.stiffness = {1000, 500}, .damping = {2, 4}, .mass = 0.1};
+  const GrainMotion motion = {.radius = {0.5, 0.5}, .branch = {0, 0, 0.99}, .velocity = {{1, 0, 3}, {0, 0, 0}}};
+  const double dt = 1e-3, before[3] = {1e-3, 0, 0}, after[3] = {2e-3, 0, 0}, shorter[3] = {1.5e-3, 0, 0};
+  const double normal = 2 * 3 * (3 + 0.005 * (10 - 6)), tangential = 4 * 1 * (1 - 3.5 * 0.005 * (1 + 4));
+  double worst = 0.0;
+  note(&worst, grain_damping_work(&motion, &contact, dt, before, after), dt * (normal + tangential));
+  note(&worst, grain_damping_work(&motion, &contact, dt, before, shorter), dt * normal);
+  AT_MOST(worst, 1e-13);
 }
 
 /* ------------------------------------------------------------------------------------------------- surface */
@@ -129,7 +147,8 @@ static void heat_is_the_change_of_enthalpy(void **state) {
 
 static void wrong_tables_are_refused(void **state) {
   (void)state;
-  const double wrong[5][4] = {{300, 1, 300, 2}, {300, 1, 200, 2}, {300, -1, 400, 2}, {300, NAN, 400, 2}, {NAN, 1, 400, 2}};
+  const double wrong[5][4] = {
+      {300, 1, 300, 2}, {300, 1, 200, 2}, {300, -1, 400, 2}, {300, NAN, 400, 2}, {NAN, 1, 400, 2}};
   for (int n = 0; n < 5; n++)
     assert_int_equal(grain_table_check(&(GrainTable){wrong[n], 2, 2}, false), BASE_ERROR_ARGUMENT);
   const double zero[4] = {300, 0, 400, 2};
@@ -142,6 +161,7 @@ static void wrong_tables_are_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(slip_work_is_force_times_slip),
+      cmocka_unit_test(dashpots_work_at_the_mean_velocity),
       cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
       cmocka_unit_test(neighbours_radiate_through_their_face),
       cmocka_unit_test(tables_are_linear_between_rows_and_constant_beyond),
