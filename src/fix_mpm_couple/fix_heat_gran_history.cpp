@@ -10,6 +10,7 @@
 #include "fix_scalar_transport_equation.h"
 #include "keyword_parser.h"
 #include "material_properties.h"
+#include "modify.h"
 #include "neigh_list.h"
 #include "pair_gran.h"
 #include "properties.h"
@@ -37,9 +38,10 @@ bool FixHeatGranGrain::history_args(char **args) {
 /* LIGGGHTS' history of contacts keeps the size that it had in the first run, but pair styles expect that of the fixes
  * which are there: without this fix they would read beyond it. */
 void FixHeatGranGrain::pre_delete(bool unfix) {
-  if (unfix && capacity_table_ && fix_ste) {
+  Fix *integrator = modify->find_fix_scalar_transport_equation("heattransfer");
+  if (unfix && capacity_table_ && integrator) {
     char integrate[] = "integrate", start[] = "start", *words[] = {integrate, start};
-    fix_ste->modify_param(2, words);
+    integrator->modify_param(2, words);
   }
   if (unfix && (laws_.size() > 0 || compliance_.size() > 0))
     fix_failed(lmp, this,
