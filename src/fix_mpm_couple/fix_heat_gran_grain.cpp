@@ -34,26 +34,34 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
     : FixHeatGran(lammps, 5, BaseWords(arg).words),
       model_(grain_heat_default()),
       surface_{},
+      convection_(false),
+      radiation_(false),
+      neighbours_(false),
       friction_(false),
+      damping_(false),
+      correction_(false),
+      conductivity_table_(false),
+      capacity_table_(false),
       walls_(lammps),
       walls_found_(false),
+      law_(HOOKE_STIFFNESS),
       reach_(0.0) {
   vector_flag = 1;
   size_vector = FLOWS;
   extvector = 1;
   KeywordParser parser(lmp, this, narg, arg, 3,
-                       {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
-                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero", "friction"});
+                       {"initial_temperature", "direct", "area", "area_correction", "indirect", "fluid", "porosity",
+                        "core", "reach", "layer", "minimum_gap", "convection", "radiation", "absolute_zero",
+                        "conductivity", "capacity", "friction", "damping"});
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
   check_keywords(parser);
-  convection_ = parser.given("convection"), radiation_ = parser.given("radiation");
   check_radiation(parser);
   const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
-  if ((conducts || !(convection_ || radiation_ || friction_)) && grain_heat_check(&model_) != BASE_OK)
+  if ((conducts || !(convection_ || radiation_ || neighbours_ || friction_)) && grain_heat_check(&model_) != BASE_OK)
     parser.fail(base_error_message());
-  force_reneighbor = model_.indirect != GRAIN_INDIRECT_NONE;
+  force_reneighbor = reaches();
   next_reneighbor = -1;
 }
 
@@ -63,6 +71,7 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("direct"))
       model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe", "collisional"});
     else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
+    else if (parser.is("area_correction")) correction_ = parser.yes_no();
     else if (parser.is("indirect"))
       model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
     else if (parser.is("fluid")) model_.fluid = parser.number(NumberRange::positive());
@@ -72,19 +81,26 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("layer")) model_.layer = parser.number(NumberRange::positive());
     else if (parser.is("minimum_gap")) model_.minimum_gap = parser.number(NumberRange::positive());
     else if (parser.is("convection")) {
+      convection_ = true;
       surface_.coefficient = parser.number(NumberRange::at_least(0.0));
       surface_.fluid_temperature = parser.number(NumberRange::any());
     } else if (parser.is("radiation")) {
       surface_.emissivity = parser.number(NumberRange::between(0.0, 1.0));
-      surface_.surroundings = parser.number(NumberRange::any());
+      radiation_ = !parser.accept("none");
+      if (radiation_) surface_.surroundings = parser.number(NumberRange::any());
+      neighbours_ = parser.accept("neighbours");
+      if (!radiation_ && !neighbours_) parser.refuse("none", "a temperature, or 'none neighbours'");
     } else if (parser.is("absolute_zero")) surface_.absolute_zero = parser.number(NumberRange::any());
+    else if (parser.is("conductivity")) conductivity_table_ = parser.choice({"constant", "table"}) == 1;
+    else if (parser.is("capacity")) capacity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("friction")) friction_ = parser.yes_no();
+    else if (parser.is("damping")) damping_ = parser.yes_no();
   }
 }
 
 /* Fourth powers mean nothing but on an absolute scale. */
 void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
-  if (!radiation_) {
+  if (!parser.given("radiation")) {
     if (parser.given("absolute_zero")) parser.fail("keyword 'absolute_zero' has a meaning with 'radiation' only");
     return;
   }
@@ -93,7 +109,7 @@ void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
   const struct {
     const char *keyword;
     double temperature;
-  } checks[] = {{"radiation", surface_.surroundings}, {"initial_temperature", T0}};
+  } checks[] = {{"radiation", radiation_ ? surface_.surroundings : T0}, {"initial_temperature", T0}};
   for (const auto &check : checks)
     if (check.temperature < surface_.absolute_zero)
       parser.fail(format_text("keyword '%s': the temperature is %g, allowed is a number >= %g; keyword 'absolute_zero' "
@@ -104,42 +120,68 @@ void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
 /* A keyword that the model does not use is a mistake in the script. */
 void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   const GrainIndirect a = GRAIN_INDIRECT_VORONOI_A, b = GRAIN_INDIRECT_VORONOI_B, layer = GRAIN_INDIRECT_LAYER;
+  const bool faces = model_.indirect == a || model_.indirect == b || neighbours_;
+  const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
   const struct {
     const char *keyword, *models;
     bool used;
-  } uses[] = {{"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
+  } uses[] = {{"area_correction", "a direct or an indirect model", conducts},
+              {"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
               {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
-              {"porosity", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
-              {"reach", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
+              {"porosity", "'indirect voronoi_a', 'voronoi_b' or 'radiation ... neighbours'", faces},
+              {"reach", "'indirect voronoi_a', 'voronoi_b' or 'radiation ... neighbours'", faces},
               {"core", "'indirect voronoi_b'", model_.indirect == b},
               {"layer", "'indirect layer'", model_.indirect == layer},
               {"minimum_gap", "'indirect layer'", model_.indirect == layer}};
   for (const auto &use : uses)
     if (parser.given(use.keyword) && !use.used)
       parser.fail(std::string("keyword '") + use.keyword + "' has a meaning with " + use.models + " only");
+  if (damping_ && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
   if (model_.indirect != GRAIN_INDIRECT_NONE) parser.require("fluid", "fluid K, the conductivity of the fluid");
 }
 
 int FixHeatGranGrain::setmask() {
-  const int neighbours = model_.indirect == GRAIN_INDIRECT_NONE ? 0 : FixConst::POST_INTEGRATE;
+  const int neighbours = reaches() ? FixConst::POST_INTEGRATE : 0;
+  const int integrate = capacity_table_ ? FixConst::FINAL_INTEGRATE : 0;
   return FixHeatGran::setmask() | FixConst::PRE_FORCE | FixConst::POST_FORCE | FixConst::PRE_FINAL_INTEGRATE |
-         neighbours;
+         neighbours | integrate;
 }
 
 void FixHeatGranGrain::init() {
   if (modify->n_fixes_style("heat/gran") > 1)
     fix_failed(lmp, this, "there is another fix heat/gran or heat/gran/...: each contact would conduct twice");
   if (force->newton_pair) fix_failed(lmp, this, "'newton off' is needed");
-  const int types = atom->get_properties()->max_type();
-  conductivity_.assign(types + 1, 0.0);
-  for (int type = 1; type <= types; type++) {
-    const MaterialProperties properties(lmp, this, type);
-    conductivity_[type] = properties.of_type("thermalConductivity", NumberRange::at_least(0.0));
-    properties.of_type("thermalCapacity", NumberRange::at_least(0.0));
-  }
+  init_conductivity();
   check_skin();
   FixHeatGran::init();
+  init_capacity();
+  init_area_correction();
   init_history();
+}
+
+/* As in LIGGGHTS' fix heat/gran/conduction: at the same force the overlap goes as E*^(-1/exponent), force ~ E*
+ * overlap^exponent. */
+void FixHeatGranGrain::init_area_correction() {
+  if (!correction_) return;
+  const size_t types = conductivity_.size();
+  std::vector<double> soft(types, 0.0), real(types, 0.0); /* (1 - nu^2) / E */
+  for (int type = 1; type < (int)types; type++) {
+    const MaterialProperties properties(lmp, this, type);
+    const double ratio = properties.of_type("poissonsRatio", NumberRange::from_below(0.0, 1.0));
+    soft[type] = (1.0 - ratio * ratio) / properties.of_type("youngsModulus", NumberRange::positive());
+    real[type] = (1.0 - ratio * ratio) / properties.of_type("youngsModulusOriginal", NumberRange::positive());
+  }
+  overlap_ratio_.assign(types * types, 1.0);
+  for (size_t a = 1; a < types; a++)
+    for (size_t b = 1; b < types; b++)
+      overlap_ratio_[a * types + b] =
+          pow((real[a] + real[b]) / (soft[a] + soft[b]), 1.0 / pair_gran->stressStrainExponent());
+}
+
+/* Distance of the centres, or of a centre from a wall (sum: its radius), with the overlap of the real stiffness. */
+double FixHeatGranGrain::find_real_distance(double distance, double sum, int type, int other) const {
+  if (!correction_ || distance >= sum) return distance;
+  return sum - (sum - distance) * overlap_ratio_[type * conductivity_.size() + other];
 }
 
 /* Of the group's grains and of those that fixes may yet insert. Material points, outside the group, have radii too. */
@@ -158,13 +200,14 @@ double FixHeatGranGrain::find_largest_radius() const {
  * would be another way to more distant pairs, but with it LIGGGHTS' walls of a given temperature take the root of a
  * negative contact area wherever there is a gap, and the temperatures become not-a-number. */
 void FixHeatGranGrain::check_skin() {
-  if (model_.indirect == GRAIN_INDIRECT_NONE) return;
-  reach_ = grain_heat_reach(&model_, find_largest_radius());
+  if (!reaches()) return;
+  const double radius = find_largest_radius();
+  reach_ = fmax(grain_heat_reach(&model_, radius), neighbours_ ? model_.reach * radius : 0.0);
   if (neighbor->skin <= reach_)
     fix_failed(
         lmp, this,
-        format_text("the skin (command neighbor) is %g, but the indirect model reaches over gaps of %g: allowed is "
-                    "a number > %g; the more, the more seldom lists are built",
+        format_text("the skin (command neighbor) is %g, but the indirect model or radiation reaches over gaps of %g: "
+                    "allowed is a number > %g; the more, the more seldom lists are built",
                     neighbor->skin, reach_, reach_));
 }
 
@@ -178,17 +221,31 @@ void FixHeatGranGrain::initial_integrate(int vflag) {
   if (!walls_found_) find_walls();
 }
 
+/* In radii of the grain. At radiation the face lies in the wall: the grain's mirror image is a neighbour. */
+double FixHeatGranGrain::find_wall_reach() const {
+  return fmax(grain_heat_wall_reach(&model_), neighbours_ ? 0.5 * model_.reach : 0.0);
+}
+
+/* LIGGGHTS' lists of a mesh hold what was nearer than half the skin when they were built. */
 void FixHeatGranGrain::find_walls() {
   walls_.take_over(this);
   walls_found_ = true;
-  if (model_.direct == GRAIN_DIRECT_NONE && !walls_.empty())
+  if (walls_.empty()) return;
+  if (model_.direct == GRAIN_DIRECT_NONE && !reaches())
     fix_failed(lmp, this,
-               "'direct none': a wall (fix wall/gran) has a temperature, but only a direct model conducts at walls; "
-               "allowed are batchelor, liggghts and pipe");
+               "'direct none': a wall (fix wall/gran) has a temperature, but only a direct or an indirect model "
+               "conducts at walls; allowed are batchelor, liggghts and pipe, or an indirect model");
+  const double reach = walls_.has_mesh() ? 2.0 * find_wall_reach() * find_largest_radius() : 0.0;
+  if (neighbor->skin <= reach)
+    fix_failed(lmp, this,
+               format_text("the skin (command neighbor) is %g, but the indirect model or radiation reaches over gaps "
+                           "of %g at a mesh with a temperature: allowed is a number > twice that, %g",
+                           neighbor->skin, 0.5 * reach, reach));
+  reach_ = fmax(reach_, reach);
 }
 
 void FixHeatGranGrain::keep_positions() {
-  if (model_.indirect == GRAIN_INDIRECT_NONE) return;
+  if (!reaches()) return;
   built_.resize(4 * (size_t)atom->nlocal);
   for (size_t k = 0; k < built_.size(); k++) built_[k] = k % 4 < 3 ? atom->x[k / 4][k % 4] : atom->radius[k / 4];
 }
@@ -216,12 +273,13 @@ void FixHeatGranGrain::exchange(int i, int j, double *record) {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
   const int *type = atom->type;
+  const double distance = sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2]);
   const GrainPair pair = {{atom->radius[i], atom->radius[j]},
-                          {conductivity_[type[i]], conductivity_[type[j]]},
-                          sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
+                          {find_conductivity(type[i], Temp[i]), find_conductivity(type[j], Temp[j])},
+                          find_real_distance(distance, atom->radius[i] + atom->radius[j], type[i], type[j])};
   const double conductance = record ? collide(i, j, pair, record) : grain_heat_conductance(&model_, &pair);
-  if (conductance == 0.0) return;
-  const double flow = (Temp[j] - Temp[i]) * conductance;
+  const double flow = (Temp[j] - Temp[i]) * conductance + (neighbours_ ? radiate(i, j, pair) : 0.0);
+  if (flow == 0.0) return;
   heatFlux[i] += flow;
   if (j < atom->nlocal) heatFlux[j] -= flow;
   for (int a = 0; a < 3; a++) {
@@ -230,31 +288,57 @@ void FixHeatGranGrain::exchange(int i, int j, double *record) {
   }
 }
 
+double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
+  const double sum = pair.radius[0] + pair.radius[1];
+  if (pair.distance - sum >= 0.5 * model_.reach * sum) return 0.0;
+  const GrainView view = grain_view(&pair, grain_face_radius(&pair, model_.porosity), surface_.emissivity);
+  hidden_[i] += view.share[0];
+  if (j < atom->nlocal) hidden_[j] += view.share[1];
+  const double temperature[2] = {Temp[i], Temp[j]};
+  return grain_radiation_between(view.area, temperature, surface_.absolute_zero);
+}
+
+double FixHeatGranGrain::radiate_to_wall(const WallContact &contact) {
+  const int i = contact.grain;
+  const double radius = atom->radius[i];
+  const double distance = find_real_distance(contact.distance, radius, atom->type[i], contact.type);
+  if (!contact.in_sight || distance - radius >= 0.5 * model_.reach * radius) return 0.0;
+  const GrainPair mirror = {{radius, radius}, {}, 2.0 * distance};
+  const double face = grain_face_radius(&mirror, model_.porosity);
+  const GrainView view = grain_view_wall(radius, distance, face, surface_.emissivity);
+  hidden_[i] += view.share[0];
+  const double temperature[2] = {Temp[i], contact.temperature};
+  return grain_radiation_between(view.area, temperature, surface_.absolute_zero);
+}
+
 void FixHeatGranGrain::exchange_with_surroundings() {
   for (int i = 0; i < atom->nlocal; i++) {
     if (!(atom->mask[i] & groupbit)) continue;
     double flows[FLOWS] = {};
     if (convection_) flows[CONVECTION] = grain_convection(&surface_, atom->radius[i], Temp[i]);
     if (radiation_) flows[RADIATION] = grain_radiation(&surface_, atom->radius[i], Temp[i]);
+    if (radiation_ && neighbours_) flows[RADIATION] *= fmax(1.0 - hidden_[i], 0.0);
     for (int k = 0; k < FLOWS; k++) heatFlux[i] += flows[k], flow_[k].add(flows[k]);
   }
 }
 
-double FixHeatGranGrain::compute_vector(int n) {
+double FixHeatGranGrain::add_up(const DoubleSum &mine) const {
   std::vector<DoubleSum> parts(comm->nprocs);
-  MPI_Allgather(&flow_[n], sizeof flow_[n], MPI_BYTE, parts.data(), sizeof flow_[n], MPI_BYTE, world);
+  MPI_Allgather(&mine, sizeof mine, MPI_BYTE, parts.data(), sizeof mine, MPI_BYTE, world);
   DoubleSum sum;
   for (const DoubleSum &part : parts) sum.add(part);
   return sum.value();
 }
 
+double FixHeatGranGrain::compute_vector(int n) { return add_up(flow_[n]); }
+
 void FixHeatGranGrain::post_force(int) {
   updatePtrs();
   for (DoubleSum &flow : flow_) flow = DoubleSum();
-  if (convection_ || radiation_) exchange_with_surroundings();
+  if (neighbours_) hidden_.assign(atom->nlocal, 0.0);
   if (friction_) heat_by_friction();
   const NeighList *list = pair_gran->list;
-  const int impact = collides() ? pair_gran->fix_extra_dnum_index(this) + (friction_ ? 3 : 0) : 0;
+  const int impact = collides() ? pair_gran->fix_extra_dnum_index(this) + (friction_ ? 4 : 0) : 0;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];
     for (int k = 0; k < list->numneigh[i]; k++) {
@@ -266,16 +350,26 @@ void FixHeatGranGrain::post_force(int) {
   }
 }
 
+double FixHeatGranGrain::find_wall_conductance(const WallContact &contact) const {
+  const int type = atom->type[contact.grain];
+  const double radius = atom->radius[contact.grain];
+  const double k[2] = {find_conductivity(type, Temp[contact.grain]),
+                       find_conductivity(contact.type, contact.temperature)};
+  const double distance = find_real_distance(contact.distance, radius, type, contact.type);
+  const double direct = contact.touches ? grain_heat_wall_conductance(&model_, radius, k, distance) : 0.0;
+  return contact.in_sight ? direct + grain_heat_wall_indirect(&model_, radius, k[0], distance) : direct;
+}
+
 /* Here and not in post_force(): walls may come after this fix. */
 void FixHeatGranGrain::pre_final_integrate() {
   updatePtrs();
-  for (const WallContact &contact : walls_.find_contacts()) {
+  for (const WallContact &contact : walls_.find_contacts(find_wall_reach())) {
     const int i = contact.grain;
     if (!(atom->mask[i] & groupbit)) continue;
-    const double k[2] = {conductivity_[atom->type[i]], conductivity_[contact.type]};
-    const double h = grain_heat_wall_conductance(&model_, atom->radius[i], k, contact.distance);
-    const double flow = h * (contact.temperature - Temp[i]);
+    double flow = find_wall_conductance(contact) * (contact.temperature - Temp[i]);
+    if (neighbours_) flow += radiate_to_wall(contact);
     heatFlux[i] += flow;
     flow_[WALLS].add(flow);
   }
+  if (convection_ || radiation_) exchange_with_surroundings();
 }

@@ -13,6 +13,7 @@ FixStyle(heat/gran/grain,FixHeatGranGrain)
 #include <vector>
 
 #include "../grain_heat/grain_heat.h"
+#include "../grain_heat/grain_table.h"
 #include "double_sum.h"
 #include "fix_heat_gran.h"
 #include "heat_walls.h"
@@ -22,14 +23,15 @@ namespace LAMMPS_NS {
 /* Heat conduction between the particles of a group (pair_style gran), in place of LIGGGHTS' fix heat/gran/conduction.
  *
  *   fix ID group heat/gran/grain initial_temperature T direct none|batchelor|liggghts|pipe|collisional
- *       [area geometric|hertz] [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F]
- *       [layer F] [minimum_gap S]
- *       [convection H T] [radiation EMISSIVITY T] [absolute_zero Z]
- *       [friction yes|no]
+ *       [area geometric|hertz] [area_correction yes|no]
+ *       [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F] [layer F] [minimum_gap S]
+ *       [convection H T] [radiation EMISSIVITY T|none [neighbours]] [absolute_zero Z]
+ *       [conductivity constant|table] [capacity constant|table]
+ *       [friction yes|no] [damping yes|no]
  *
  * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that
  * integrates Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows into the group in the last step,
- * W: convection, radiation, walls, friction. */
+ * W: convection, radiation, walls, friction, damping. */
 class FixHeatGranGrain : public FixHeatGran {
  public:
   FixHeatGranGrain(class LAMMPS *, int, char **);
@@ -41,6 +43,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void pre_force(int);
   void post_force(int);
   void pre_final_integrate();
+  void final_integrate();
+  double compute_scalar();
   double compute_vector(int);
   void pre_delete(bool);
   int n_history_extra();
@@ -49,33 +53,56 @@ class FixHeatGranGrain : public FixHeatGran {
   void start_slip(double *history) const;
 
  private:
-  enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, FLOWS };
+  enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, DAMPING, FLOWS };
+  enum Law { HOOKE_STIFFNESS, HERTZ, HERTZ_STIFFNESS }; /* normal models of the pair style */
 
   GrainHeat model_;
   GrainSurface surface_;
-  bool convection_, radiation_, friction_;
+  bool convection_, radiation_;      /* to the surroundings */
+  bool neighbours_;                  /* radiation between grains, and to walls of given temperature */
+  bool friction_, damping_, correction_;
+  bool conductivity_table_, capacity_table_;
   DoubleSum flow_[FLOWS];            /* W, this rank's part */
   HeatWalls walls_;
   bool walls_found_;                 /* in this run */
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
-  std::vector<double> stiffness_;    /* of the tangential springs by pair of types, N/m; with friction */
+  Law law_;                          /* with friction */
+  std::vector<GrainContact> laws_;   /* by pair of types, with friction: factors of find_contact(); mass is unused */
   std::vector<double> capacity_;     /* J/(kg K), by atom type; with collisions */
   std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
+  std::vector<double> overlap_ratio_; /* real by simulated overlap, by pair of types; with area_correction */
+  std::vector<double> conductivity_rows_, capacity_rows_; /* of tables: temperature, then a value per atom type */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
+  std::vector<double> hidden_;       /* share of a grain's surface that neighbours take; with `neighbours` */
   std::vector<double> built_;        /* positions and radii when the neighbour list was built */
 
   void read_model(class KeywordParser &);
   void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
+  void init_area_correction();
+  void init_conductivity();
+  void init_capacity();
+  GrainTable make_table(const std::vector<double> &rows) const;
+  double find_conductivity(int type, double temperature) const;
+  double find_capacity(int type, double temperature) const; /* J/(kg K) */
+  double add_up(const DoubleSum &part) const;
+  double find_real_distance(double distance, double sum, int type, int other) const;
+  bool reaches() const { return model_.indirect != GRAIN_INDIRECT_NONE || neighbours_; } /* over gaps */
+  double find_wall_reach() const;
   bool collides() const { return model_.direct == GRAIN_DIRECT_COLLISIONAL; }
   void init_history();
   void init_friction();
+  GrainContact read_law(int type, int other) const;
+  GrainContact find_contact(int i, int j, double overlap) const;
   void init_collisions();
   double collide(int i, int j, const GrainPair &pair, double *record) const;
   void heat_by_friction();
   void slip(int i, int j, double *history);
   void find_walls();
+  double find_wall_conductance(const WallContact &contact) const;
+  double radiate(int i, int j, const GrainPair &pair);
+  double radiate_to_wall(const WallContact &contact);
   void keep_positions();
   void check_radiation(const class KeywordParser &) const;
   void exchange(int i, int j, double *record);

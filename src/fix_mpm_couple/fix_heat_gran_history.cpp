@@ -2,12 +2,15 @@
 /* fix heat/gran/grain: what needs the past of a contact, friction and collisions. LIGGGHTS keeps values for this fix
  * with the history of each contact; they travel with the grains and are in restart files. */
 #include <cmath>
+#include <vector>
 
 #include "atom.h"
 #include "fix_contact_history.h"
 #include "fix_heat_gran_grain.h"
+#include "fix_scalar_transport_equation.h"
 #include "keyword_parser.h"
 #include "material_properties.h"
+#include "modify.h"
 #include "neigh_list.h"
 #include "pair_gran.h"
 #include "properties.h"
@@ -16,16 +19,16 @@
 
 using namespace LAMMPS_NS;
 
-int FixHeatGranGrain::n_history_extra() { return (friction_ ? 3 : 0) + (collides() ? 2 : 0); }
+int FixHeatGranGrain::n_history_extra() { return (friction_ ? 4 : 0) + (collides() ? 2 : 0); }
 
-/* The tangential spring of the step before changes sign with the order of the grains, age and speed of impact do
- * not. */
+/* The tangential spring of the step before changes sign with the order of the grains; its stiffness, age and speed of
+ * impact do not. */
 bool FixHeatGranGrain::history_args(char **args) {
-  static char names[5][16] = {"slip_x", "slip_y", "slip_z", "impact_age", "impact_speed"};
+  static char names[6][16] = {"slip_x", "slip_y", "slip_z", "slip_stiffness", "impact_age", "impact_speed"};
   static char flags[2][2] = {"0", "1"};
   int count = 0;
-  for (int k = 0; k < 5; k++) {
-    if (!(k < 3 ? friction_ : collides())) continue;
+  for (int k = 0; k < 6; k++) {
+    if (!(k < 4 ? friction_ : collides())) continue;
     args[2 * count] = names[k], args[2 * count + 1] = flags[k < 3];
     count++;
   }
@@ -35,7 +38,12 @@ bool FixHeatGranGrain::history_args(char **args) {
 /* LIGGGHTS' history of contacts keeps the size that it had in the first run, but pair styles expect that of the fixes
  * which are there: without this fix they would read beyond it. */
 void FixHeatGranGrain::pre_delete(bool unfix) {
-  if (unfix && (stiffness_.size() > 0 || compliance_.size() > 0))
+  Fix *integrator = modify->find_fix_scalar_transport_equation("heattransfer");
+  if (unfix && capacity_table_ && integrator) {
+    char integrate[] = "integrate", start[] = "start", *words[] = {integrate, start};
+    integrator->modify_param(2, words);
+  }
+  if (unfix && (laws_.size() > 0 || compliance_.size() > 0))
     fix_failed(lmp, this,
                "with 'friction yes' or 'direct collisional' the fix cannot be removed after the first run");
 }
@@ -51,39 +59,87 @@ void FixHeatGranGrain::init_history() {
 }
 
 void FixHeatGranGrain::init_friction() {
+  const char *const names[] = {"hooke/stiffness", "hertz", "hertz/stiffness"};
+  int law = 0;
+  while (law < 3 && !pair_gran->contact_match("normal", names[law])) law++;
   /* The spring comes first in the history if nothing else of the pair style is in it. */
-  if (!pair_gran->contact_match("normal", "hooke/stiffness") || !pair_gran->contact_match("tangential", "history") ||
-      pair_gran->dnum_pair() != 3)
+  if (law == 3 || !pair_gran->contact_match("tangential", "history") || pair_gran->dnum_pair() != 3)
     fix_failed(lmp, this,
-               "keyword 'friction': allowed is pair_style gran model hooke/stiffness tangential history, without "
-               "models that have a history of their own (rolling_friction epsd..., cohesion with liquid)");
-  const int types = atom->get_properties()->max_type();
-  stiffness_.assign((types + 1) * (types + 1), 0.0);
-  for (int a = 1; a <= types; a++)
-    for (int b = 1; b <= types; b++)
-      stiffness_[a * (types + 1) + b] =
-          MaterialProperties(lmp, this, a).of_pair("kt", NumberRange::at_least(0.0), b);
+               "keyword 'friction': allowed is pair_style gran model hooke/stiffness, hertz or hertz/stiffness with "
+               "tangential history, without models that have a history of their own (rolling_friction epsd..., "
+               "cohesion with liquid)");
+  law_ = (Law)law;
+  const size_t types = conductivity_.size();
+  laws_.assign(types * types, GrainContact());
+  for (size_t a = 1; a < types; a++)
+    for (size_t b = 1; b < types; b++) laws_[a * types + b] = read_law(a, b);
 }
 
-/* Half of the work to each grain. Contacts are in the lists of two ranks if the grains are: each heats its own. */
+/* Of LIGGGHTS' normal models. `hertz`: stiffness 4/3 E* and 8 G*; damping as a share of critical damping. */
+GrainContact FixHeatGranGrain::read_law(int a, int b) const {
+  const MaterialProperties one(lmp, this, a), two(lmp, this, b);
+  const NumberRange any = NumberRange::at_least(0.0), modulus = NumberRange::positive();
+  if (law_ != HERTZ) {
+    GrainContact law = {{one.of_pair("kn", any, b), one.of_pair("kt", any, b)}, {}, 0.0};
+    if (damping_) law.damping[0] = one.of_pair("gamman", any, b), law.damping[1] = one.of_pair("gammat", any, b);
+    return law;
+  }
+  double soft = 0.0, shear = 0.0;
+  for (const MaterialProperties *grain : {&one, &two}) {
+    const double E = grain->of_type("youngsModulus", modulus);
+    const double nu = grain->of_type("poissonsRatio", NumberRange::from_below(0.0, 1.0));
+    soft += (1.0 - nu * nu) / E, shear += 2.0 * (2.0 - nu) * (1.0 + nu) / E;
+  }
+  GrainContact law = {{4.0 / 3.0 / soft, 8.0 / shear}, {}, 0.0};
+  if (!damping_) return law;
+  const double log_e = log(one.of_pair("coefficientRestitution", NumberRange::positive(), b));
+  const double share = -2.0 * sqrt(5.0 / 6.0) * log_e / sqrt(log_e * log_e + M_PI * M_PI);
+  law.damping[0] = share * sqrt(2.0 / soft), law.damping[1] = share * sqrt(8.0 / shear);
+  return law;
+}
+
+GrainContact FixHeatGranGrain::find_contact(int i, int j, double overlap) const {
+  GrainContact contact = laws_[atom->type[i] * conductivity_.size() + atom->type[j]];
+  contact.mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
+  const double a = atom->radius[i], b = atom->radius[j];
+  const double radius = law_ == HOOKE_STIFFNESS ? 1.0 : sqrt(a * b / (a + b) * overlap); /* Hertz' contact radius */
+  for (int k = 0; k < 2; k++) {
+    contact.stiffness[k] *= radius;
+    contact.damping[k] *= law_ == HERTZ ? sqrt(radius * contact.mass) : radius * contact.mass;
+  }
+  return contact;
+}
+
+/* Half of the work to each grain. Contacts are in the lists of two ranks if the grains are: each heats its own. The
+ * energy that the spring still has when a contact opens is lost to LIGGGHTS. */
 void FixHeatGranGrain::slip(int i, int j, double *history) {
   double *before = history + pair_gran->fix_extra_dnum_index(this);
   GrainMotion motion = {{atom->radius[i], atom->radius[j]}, {}, {}, {}};
-  double square = 0.0;
+  double square = 0.0, work[2] = {};
   for (int a = 0; a < 3; a++) {
     motion.branch[a] = atom->x[i][a] - atom->x[j][a];
     motion.velocity[0][a] = atom->v[i][a], motion.velocity[1][a] = atom->v[j][a];
     motion.spin[0][a] = atom->omega[i][a], motion.spin[1][a] = atom->omega[j][a];
     square += motion.branch[a] * motion.branch[a];
+    work[0] += 0.5 * before[3] * before[a] * before[a];
   }
   const double reach = motion.radius[0] + motion.radius[1];
+  double stiffness = 0.0;
   if (square < reach * reach) {
-    const double stiffness = stiffness_[atom->type[i] * conductivity_.size() + atom->type[j]];
-    const double power = grain_slip_work(&motion, stiffness, update->dt, before, history) / update->dt;
-    for (const int grain : {i, j})
-      if (grain < atom->nlocal) heatFlux[grain] += 0.5 * power, flow_[FRICTION].add(0.5 * power);
+    const GrainContact contact = find_contact(i, j, reach - sqrt(square));
+    stiffness = contact.stiffness[1];
+    const double both[2] = {before[3] > 0.0 ? before[3] : stiffness, stiffness}; /* 0: a new contact, or a spring that was set */
+    work[0] = grain_slip_work(&motion, both, update->dt, before, history);
+    if (damping_) work[1] = grain_damping_work(&motion, &contact, update->dt, before, history);
+  }
+  for (const int grain : {i, j}) {
+    if (grain >= atom->nlocal) continue;
+    const double share = 0.5 / update->dt;
+    heatFlux[grain] += share * (work[0] + work[1]);
+    flow_[FRICTION].add(share * work[0]), flow_[DAMPING].add(share * work[1]);
   }
   for (int a = 0; a < 3; a++) before[a] = history[a];
+  before[3] = stiffness;
 }
 
 void FixHeatGranGrain::start_slip(double *history) const {
@@ -110,7 +166,8 @@ void FixHeatGranGrain::init_collisions() {
     const MaterialProperties properties(lmp, this, type);
     const double ratio = properties.of_type("poissonsRatio", NumberRange::from_below(0.0, 1.0));
     capacity_[type] = properties.of_type("thermalCapacity", NumberRange::positive());
-    compliance_[type] = (1.0 - ratio * ratio) / properties.of_type("youngsModulus", NumberRange::positive());
+    const char *modulus = correction_ ? "youngsModulusOriginal" : "youngsModulus";
+    compliance_[type] = (1.0 - ratio * ratio) / properties.of_type(modulus, NumberRange::positive());
   }
 }
 
@@ -131,7 +188,8 @@ double FixHeatGranGrain::collide(int i, int j, const GrainPair &pair, double *re
   for (int g = 0; g < 2; g++) {
     const int type = atom->type[grains[g]];
     mass[g] = atom->rmass[grains[g]];
-    impact.heat_capacity[g] = mass[g] * capacity_[type] / (4.0 / 3.0 * M_PI * pow(pair.radius[g], 3));
+    const double density = mass[g] / (4.0 / 3.0 * M_PI * pow(pair.radius[g], 3));
+    impact.heat_capacity[g] = density * find_capacity(type, Temp[grains[g]]);
     compliance += compliance_[type];
   }
   grain_impact_hertz(&pair, mass, 1.0 / compliance, record[1], &impact.radius_max, &impact.duration);

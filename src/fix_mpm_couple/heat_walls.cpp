@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "heat_walls.h"
 
+#include <algorithm>
+
 /* An installed LIGGGHTS lacks the generated list of contact models that the headers of its walls ask for. All they use
  * of it, in templates that are not instantiated here, are names for "no model"; the rest counts as read. */
 #define CONTACT_MODEL_CONSTANTS_H_
@@ -53,25 +55,55 @@ void HeatWalls::take_over(const Fix *fix) {
   }
 }
 
-const std::vector<WallContact> &HeatWalls::find_contacts() {
+bool HeatWalls::has_mesh() const {
+  for (FixWallGran *wall : walls_)
+    if (wall->is_mesh_wall()) return true;
+  return false;
+}
+
+const std::vector<WallContact> &HeatWalls::find_contacts(double reach) {
   contacts_.clear();
   for (FixWallGran *wall : walls_) {
-    if (!wall->is_mesh_wall()) touch_primitive(wall);
-    for (int k = 0; wall->is_mesh_wall() && k < wall->n_meshes(); k++) touch_mesh(wall->mesh_list()[k]);
+    if (!wall->is_mesh_wall()) touch_primitive(wall, reach);
+    for (int k = 0; wall->is_mesh_wall() && k < wall->n_meshes(); k++) touch_mesh(wall->mesh_list()[k], reach);
   }
+  if (reach > 0.0) find_walls_in_sight();
   return contacts_;
 }
 
-void HeatWalls::touch_primitive(FixWallGran *wall) {
+void HeatWalls::touch_primitive(FixWallGran *wall, double reach) {
   int *near;
   const int count = wall->primitiveWall()->getNeighbors(near);
   for (int n = 0; n < count; n++) {
     const int i = near[n];
-    double delta[3];
     if (!(atom->mask[i] & wall->groupbit)) continue;
-    const double gap = wall->primitiveWall()->resolveContact(atom->x[i], atom->radius[i], delta);
-    if (gap < 0.0)
-      contacts_.push_back({i, wall->atom_type_wall(), atom->radius[i] + gap, wall->*Access::temperature()});
+    WallContact contact = {i, wall->atom_type_wall(), 0.0, wall->*Access::temperature(), false, false, {}};
+    const double gap = wall->primitiveWall()->resolveContact(atom->x[i], atom->radius[i], contact.delta);
+    contact.distance = atom->radius[i] + gap, contact.touches = gap < 0.0;
+    if (gap < 0.0 || gap < reach * atom->radius[i]) contacts_.push_back(contact);
+  }
+}
+
+/* The nearest point of a wall lies on or behind the tangent plane of a nearer one, or less than 60 degrees aside: both
+ * share their paths through the fluid, which fill a cone of some 34 degrees about the shortest. */
+static bool is_behind(const WallContact &wall, const WallContact &nearer) {
+  double dot = 0.0;
+  for (int a = 0; a < 3; a++) dot += wall.delta[a] * nearer.delta[a];
+  return dot > 0.5 * wall.distance * nearer.distance || dot >= (1.0 - 1e-9) * nearer.distance * nearer.distance;
+}
+
+/* A plane of many triangles, or an edge of two, is one wall; a corner of two planes is two. */
+void HeatWalls::find_walls_in_sight() {
+  std::vector<WallContact *> order, seen;
+  for (WallContact &contact : contacts_) order.push_back(&contact);
+  std::stable_sort(order.begin(), order.end(), [](const WallContact *a, const WallContact *b) {
+    return a->grain != b->grain ? a->grain < b->grain : a->distance < b->distance;
+  });
+  for (WallContact *contact : order) {
+    if (!seen.empty() && seen.front()->grain != contact->grain) seen.clear();
+    contact->in_sight = std::none_of(seen.begin(), seen.end(),
+                                     [&](const WallContact *nearer) { return is_behind(*contact, *nearer); });
+    if (contact->in_sight) seen.push_back(contact);
   }
 }
 
@@ -83,17 +115,20 @@ static bool is_partner(FixContactHistoryMesh *history, int i, int triangle) {
   return false;
 }
 
-void HeatWalls::touch_mesh(FixMeshSurface *fix_mesh) {
+void HeatWalls::touch_mesh(FixMeshSurface *fix_mesh, double reach) {
   TriMesh *mesh = fix_mesh->triMesh();
   const ScalarContainer<double> *temperature = mesh->prop().getGlobalProperty<ScalarContainer<double>>("Temp");
   if (!temperature) return;
   for (int t = 0; t < mesh->sizeLocal() + mesh->sizeGhost(); t++)
     for (const int i : fix_mesh->meshNeighlist()->get_contact_list(t)) {
-      double delta[3], corner[3]; /* corner: barycentric coordinates */
+      if (i >= atom->nlocal) continue;
+      WallContact contact = {i, fix_mesh->atomTypeWall(), 0.0, (*temperature)(0), false, false, {}};
+      double corner[3]; /* barycentric coordinates */
       int sides;
-      if (i >= atom->nlocal || !is_partner(fix_mesh->contactHistory(), i, mesh->id(t))) continue;
-      const double gap = mesh->resolveTriSphereContactBary(i, t, atom->radius[i], atom->x[i], delta, corner, sides);
-      if (gap < 0.0)
-        contacts_.push_back({i, fix_mesh->atomTypeWall(), atom->radius[i] + gap, (*temperature)(0)});
+      const double radius = atom->radius[i];
+      const double gap = mesh->resolveTriSphereContactBary(i, t, radius, atom->x[i], contact.delta, corner, sides);
+      contact.distance = radius + gap;
+      contact.touches = gap < 0.0 && is_partner(fix_mesh->contactHistory(), i, mesh->id(t));
+      if (contact.touches || gap < reach * radius) contacts_.push_back(contact);
     }
 }

@@ -56,3 +56,15 @@ double MaterialProperties::of_pair(const char *name, const NumberRange &range, i
                            property->size_array_rows, property->size_array_cols, std::max(type_, other)));
   return checked(name, property->compute_array(type_ - 1, other - 1), range);
 }
+
+std::vector<double> MaterialProperties::table(const char *name, int columns, const char *usage) const {
+  FixPropertyGlobal *property = require(name, "matrix", usage);
+  if (property->size_array_cols != columns)
+    fix_failed(lmp, fix_,
+               format_text("property '%s' has %d columns, allowed are %d: the temperature and one per atom type", name,
+                           property->size_array_cols, columns));
+  std::vector<double> values;
+  for (int row = 0; row < property->size_array_rows; row++)
+    for (int column = 0; column < columns; column++) values.push_back(property->compute_array(row, column));
+  return values;
+}

@@ -21,6 +21,8 @@ class MaterialProperties : protected Pointers {
   double of_type(const char *name, const NumberRange &range) const;
   double of_pair(const char *name, const NumberRange &range) const { return of_pair(name, range, type_); }
   double of_pair(const char *name, const NumberRange &range, int other) const;
+  /* `matrix` with `columns` columns, row by row: a property over temperature. `usage`: the values, for messages. */
+  std::vector<double> table(const char *name, int columns, const char *usage) const;
 
  private:
   const Fix *fix_;

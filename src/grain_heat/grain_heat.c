@@ -63,6 +63,19 @@ static double conduct_through_fluid(const GrainHeat *model, const GrainPair *pai
   return grain_indirect_voronoi_b(pair, face, model->fluid, model->core);
 }
 
+double grain_heat_wall_reach(const GrainHeat *model) {
+  if (model->indirect == GRAIN_INDIRECT_NONE) return 0.0;
+  return model->indirect == GRAIN_INDIRECT_LAYER ? model->layer : 0.5 * model->reach;
+}
+
+double grain_heat_wall_indirect(const GrainHeat *model, double radius, double conductivity, double distance) {
+  if (model->indirect == GRAIN_INDIRECT_NONE) return 0.0;
+  if (model->indirect == GRAIN_INDIRECT_LAYER)
+    return grain_indirect_layer_wall(radius, distance, model->fluid, model->layer, model->minimum_gap);
+  const GrainPair mirror = {{radius, radius}, {conductivity, conductivity}, 2.0 * distance};
+  return 2.0 * conduct_through_fluid(model, &mirror);
+}
+
 double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair) {
   return conduct_in_contact(model, pair) + conduct_through_fluid(model, pair);
 }

@@ -68,6 +68,8 @@ double grain_indirect_voronoi_b(const GrainPair *pair, double face, double fluid
 /* Surrounding layer (table 2, corrected: factor k_f; R_e at most the smaller radius): the larger grain carries a layer
  * of fluid of thickness layer * R; minimum_gap > 0, m, bounds the length of a path from below. Closed form. */
 double grain_indirect_layer(const GrainPair *pair, double fluid, double layer, double minimum_gap);
+/* The same between a grain, which carries the layer, and a plane at `distance` (> 0) from its centre, m. */
+double grain_indirect_layer_wall(double radius, double distance, double fluid, double layer, double minimum_gap);
 
 /* --------------------------------------------------------------------------------------------------- model */
 typedef enum GrainArea { GRAIN_AREA_GEOMETRIC, GRAIN_AREA_HERTZ } GrainArea;
@@ -108,11 +110,15 @@ double grain_heat_conductance(const GrainHeat *model, const GrainPair *pair);
  * 5, where the published fit ends and conduction is nearly steady. */
 double grain_heat_impact_conductance(const GrainHeat *model, const GrainPair *pair, const GrainImpact *impact,
                                      double age, double step);
-/* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m; h = 0 for indirect models. The
- * wall is the limit of a grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its
- * surface. */
+/* Of the direct model between a grain and a wall at `distance` (> 0) from its centre, m. The wall is the limit of a
+ * grain of infinite radius; in a thermal pipe, which it enters as R1 = 0, the path ends at its surface. */
 double grain_heat_wall_conductance(const GrainHeat *model, double radius, const double conductivity[2],
                                    double distance);
+/* Of the indirect model between a grain of the given conductivity and the surface of a wall, which is isothermal, W/K.
+ * The Voronoi models: half of the way to the mirror image of the grain, hence twice the h of that pair. */
+double grain_heat_wall_indirect(const GrainHeat *model, double radius, double conductivity, double distance);
+/* Gap between a grain and a wall, in radii of the grain, from which on grain_heat_wall_indirect is 0. */
+double grain_heat_wall_reach(const GrainHeat *model);
 /* Smallest gap between surfaces, m, from which on h = 0 for every pair of grains no larger than `radius`; 0 without an
  * indirect model. */
 double grain_heat_reach(const GrainHeat *model, double radius);
@@ -126,13 +132,23 @@ typedef struct GrainMotion {
 /* Unit normal from grain 1 to grain 0, and the tangential velocity of the surface of grain 0 relative to that of grain 1 at
  * the point of contact, m/s. distance: |branch|, > 0. Returns the speed at which the centres move apart, m/s. */
 double grain_tangential_velocity(const GrainMotion *motion, double distance, double normal[3], double velocity[3]);
-/* Work of friction in a step of duration `step`, J. The tangential spring, of the given stiffness (N/m), goes from
- * `before` by the grains' motion to a trial state, which the Coulomb limit shortens to `after`, m: mean force times
- * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not
- * keep the spring. (Negative only in a step in which the slip turns back by more than the spring is long.) With
- * `before` and `after` negated the same for the grains in the other order. */
-double grain_slip_work(const GrainMotion *motion, double stiffness, double step, const double before[3],
+/* Springs (N/m) and dashpots (N s/m) of the contact at its overlap, normal and tangential, and the effective mass,
+ * kg. */
+typedef struct GrainContact {
+  double stiffness[2], damping[2], mass;
+} GrainContact;
+/* Work of friction in a step of duration `step`, J. The tangential spring goes from `before` by the grains' motion to a
+ * trial state, which the Coulomb limit shortens to `after`, m: mean force times slip, nothing where the limit is not
+ * reached. Its stiffness goes from stiffness[0] to stiffness[1], N/m: what the spring loses by that counts, too (< 0
+ * where it gains). That is what velocity Verlet takes from the grains' motion and does not keep in the spring. (Slip
+ * work is negative only in a step in which the slip turns back by more than the spring is long.) With `before` and
+ * `after` negated the same for the grains in the other order. */
+double grain_slip_work(const GrainMotion *motion, const double stiffness[2], double step, const double before[3],
                        const double after[3]);
+/* Work of the dashpots in the step, J, with the velocities half-way between those of the motion and the next ones; the
+ * tangential dashpot rests while the contact slips. */
+double grain_damping_work(const GrainMotion *motion, const GrainContact *contact, double step, const double before[3],
+                          const double after[3]);
 
 /* ------------------------------------------------------------------------------------------------- surface */
 /* What a grain exchanges with its surroundings over its whole surface, 4 pi R^2. Temperatures on the scale of the
@@ -147,6 +163,19 @@ double grain_convection(const GrainSurface *exchange, double radius, double temp
 /* Stefan-Boltzmann: sigma emissivity 4 pi R^2 (T_s^4 - T^4), absolute temperatures, W. Surroundings are black or
  * large. */
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature);
+
+/* Two grains that see each other through the Voronoi face between them, a circle of radius `face`; or a grain (0) and a
+ * plane. Seen from either centre the face bounds a cap of the surface, without the contact. The smaller cap sees the
+ * other one alone: the enclosure of two grey surfaces of heat transfer textbooks, 1/G = 1/A_min + (1 - e)/e (1/A0 +
+ * 1/A1). Radiation beyond the nearest neighbours is left out. */
+typedef struct GrainView {
+  double area;     /* G, m2 */
+  double share[2]; /* of the surface of each grain that the face takes, 0 to 1, with the contact; [1] of a plane: 0 */
+} GrainView;
+GrainView grain_view(const GrainPair *pair, double face, double emissivity);
+GrainView grain_view_wall(double radius, double distance, double face, double emissivity);
+/* Into grain 0: sigma G (T1^4 - T0^4), absolute temperatures, W; the opposite to the last bit if both change places. */
+double grain_radiation_between(double area, const double temperature[2], double absolute_zero);
 
 #ifdef __cplusplus
 }

@@ -64,7 +64,8 @@ static double conduct_path(const Paths *paths, double angle) {
 static double find_start_scale(const Paths *paths) {
   const Ordered *o = paths->pair;
   const double reduced = o->r1 * o->r2 / (o->r1 + o->r2);
-  const double length = o->gap + paths->fluid * (paths->circle1 / o->k1 + paths->circle2 / o->k2);
+  const double solid1 = paths->circle1 - o->contact / paths->cone1, solid2 = paths->circle2 - o->contact / paths->cone2;
+  const double length = o->gap + paths->fluid * fmax(solid1 / o->k1 + solid2 / o->k2, 0.0);
   const double dr = 2.0 * reduced * length / (o->contact + sqrt(o->contact * o->contact + 2.0 * reduced * length));
   return dr / o->r1;
 }
@@ -81,7 +82,7 @@ static double find_end_scale(const Paths *paths, double range) {
 /* From angle `from` over `range` (with a sign). Substitution angle = scale (exp(t) - 1): the integrand ~ 1 / resistance
  * varies over many orders of magnitude of the angle. One panel of 16 points per 0.75 of t. */
 static double integrate_paths(const Paths *paths, double from, double range, double scale) {
-  scale = fmin(scale, fabs(range));
+  scale = fmin(fmax(scale, 1e-12 * fabs(range)), fabs(range));
   const double end = log1p(fabs(range) / scale), sign = range < 0.0 ? -1.0 : 1.0;
   const int panels = (int)ceil(end / 0.75);
   const double half = 0.5 * end / panels;
@@ -176,4 +177,18 @@ double grain_indirect_layer(const GrainPair *pair, double fluid, double layer, d
   const double gap0 = fmax(o.gap, minimum_gap), s0 = o.d - gap0;
   const double s1 = sqrt(fmax((o.r1 - edge) * (o.r1 + edge), 0.0)) + sqrt((o.r2 - edge) * (o.r2 + edge));
   return fluid * (core + integrate_gap(&o, s0, gap0, s1));
+}
+
+/* As above with s = sqrt(R^2 - r^2) = distance - gap: 2 pi r dr = -2 pi s ds. */
+double grain_indirect_layer_wall(double radius, double distance, double fluid, double layer, double minimum_gap) {
+  const double outer = radius * (1.0 + layer), near = distance - minimum_gap;
+  if (distance >= outer) return 0.0;
+  const double contact = sqrt(fmax((radius - distance) * (radius + distance), 0.0));
+  const double edge = fmin(radius, sqrt((outer - distance) * (outer + distance)));
+  const double inner = near < radius ? sqrt((radius - near) * (radius + near)) : 0.0;
+  if (near <= 0.0 || inner >= edge) return fluid * PI * (edge - contact) * (edge + contact) / minimum_gap;
+  const double core = PI * (inner - contact) * (inner + contact) / minimum_gap;
+  const double gap0 = fmax(distance - radius, minimum_gap), s0 = distance - gap0;
+  const double s1 = sqrt(fmax((radius - edge) * (radius + edge), 0.0));
+  return fluid * (core + 2.0 * PI * (distance * log1p((s0 - s1) / gap0) - (s0 - s1)));
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include <math.h>
+#include <stdbool.h>
 
 #include "grain_heat.h"
 
@@ -24,17 +25,42 @@ double grain_tangential_velocity(const GrainMotion *motion, double distance, dou
   return along;
 }
 
-double grain_slip_work(const GrainMotion *motion, double stiffness, double step, const double before[3],
-                       const double after[3]) {
+/* As LIGGGHTS moves the spring; true if the Coulomb limit shortened it. */
+static bool move_spring(const GrainMotion *motion, double step, const double before[3], const double after[3],
+                        double trial[3]) {
   const double distance = sqrt(dot(motion->branch, motion->branch));
-  double normal[3], trial[3];
+  double normal[3];
   grain_tangential_velocity(motion, distance, normal, trial);
   for (int a = 0; a < 3; a++) trial[a] = before[a] + trial[a] * step;
   const double along = dot(trial, normal);
   for (int a = 0; a < 3; a++) trial[a] -= along * normal[a];
-  if (dot(trial, trial) <= dot(after, after) * (1.0 + 1e-12)) return 0.0;
+  return dot(trial, trial) > dot(after, after) * (1.0 + 1e-12);
+}
+
+double grain_slip_work(const GrainMotion *motion, const double stiffness[2], double step, const double before[3],
+                       const double after[3]) {
+  double trial[3], work = 0.5 * (stiffness[0] - stiffness[1]) * dot(before, after);
+  if (!move_spring(motion, step, before, after, trial)) return work;
   /* Mean force times slip. The force of the step's end alone would err to first order in the step. */
-  double work = 0.0;
-  for (int a = 0; a < 3; a++) work += 0.5 * stiffness * (before[a] + after[a]) * (trial[a] - after[a]);
+  for (int a = 0; a < 3; a++)
+    work += 0.5 * (stiffness[0] * before[a] + stiffness[1] * after[a]) * (trial[a] - after[a]);
   return work;
+}
+
+/* The force of a step acts until the middle of the next one: what it takes is force times mean velocity. Rolling about
+ * the contact makes spheres 7/2 times as easy to move tangentially. */
+double grain_damping_work(const GrainMotion *motion, const GrainContact *contact, double step, const double before[3],
+                          const double after[3]) {
+  const double distance = sqrt(dot(motion->branch, motion->branch)), half = 0.5 * step / contact->mass;
+  double normal[3], slide[3], trial[3];
+  const double parting = grain_tangential_velocity(motion, distance, normal, slide);
+  const double overlap = motion->radius[0] + motion->radius[1] - distance;
+  const double force = contact->stiffness[0] * overlap - contact->damping[0] * parting;
+  double power = contact->damping[0] * parting * (parting + half * force);
+  if (move_spring(motion, step, before, after, trial)) return power * step;
+  for (int a = 0; a < 3; a++) {
+    const double back = -contact->stiffness[1] * after[a] - contact->damping[1] * slide[a];
+    power += contact->damping[1] * slide[a] * (slide[a] + 3.5 * half * back);
+  }
+  return power * step;
 }

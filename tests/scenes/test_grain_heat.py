@@ -5,7 +5,6 @@ import math
 import random
 
 import pytest
-from test_surface_walls import quad, stl
 from test_with_grains import GRAINS, PAIR, POINTS
 
 HEAD = """
@@ -138,6 +137,24 @@ def test_liggghts_variant_is_the_stock_fix(scene, dempm, liggghts, tmp_path):
         assert last(ours, "z") == last(stock, "z")
 
 
+@pytest.mark.parametrize("model", ["hertz", "hooke"])
+def test_area_correction_is_that_of_the_stock_fix(model, dempm, liggghts, tmp_path):
+    """Grains and floor of other real stiffnesses than those simulated."""
+    real = "fix m0 all property/global youngsModulusOriginal peratomtype 6e8 5e7\n"
+    if model == "hooke":
+        real += "fix m5 all property/global characteristicVelocity scalar 1\n"
+
+    def script(fix):
+        return falling(real + fix, 5000).replace("model hertz", f"model {model}")
+
+    ours, plain = (dempm(script(OURS.replace("liggghts", f"liggghts area_correction {word}")), cwd=tmp_path / word)
+                   for word in ("yes", "no"))
+    stock = liggghts(script(STOCK.replace("300", "300 area_correction yes")), cwd=tmp_path / "stock")
+    assert deviation(plain, stock) > 0.01
+    assert last(ours, "z") == last(stock, "z")
+    assert deviation(ours, stock) < 1e-10
+
+
 # ------------------------------------------------------------------------------------------------ two grains
 def circle(a, b, d):
     return math.sqrt(a * a - ((a * a - b * b + d * d) / (2 * d)) ** 2)
@@ -152,6 +169,18 @@ def circle(a, b, d):
 def test_flow_between_two_grains(words, conductance, dempm):
     run = dempm(two_grains(f"fix heat all heat/gran/grain initial_temperature 300 {words}\n", 1))
     flow = conductance(0.005, 0.004, 0.0089) * (250.0 - 350.0)
+    assert last(run, "f_heatFlux[0]") == pytest.approx([flow, -flow], rel=1e-10)
+
+
+@pytest.mark.parametrize("area, radius", [("geometric", circle), ("hertz", lambda a, b, d: math.sqrt(
+    a * b / (a + b) * (a + b - d)))])
+def test_overlaps_are_corrected_for_a_softened_modulus(area, radius, dempm):
+    """At the same force Hertz' overlap goes as E*^(-2/3)."""
+    real = "fix m0 all property/global youngsModulusOriginal peratomtype 25e6 1e9\n"
+    fix = f"fix heat all heat/gran/grain initial_temperature 300 direct batchelor area {area} area_correction yes\n"
+    ratio = ((1 / 25e6 + 1 / 1e9) / (2 / 5e6)) ** (2 / 3)
+    run = dempm(two_grains(real + fix, 1))
+    flow = 4 * 20 * 90 / 110 * radius(0.005, 0.004, 0.009 - 0.0001 * ratio) * (250.0 - 350.0)
     assert last(run, "f_heatFlux[0]") == pytest.approx([flow, -flow], rel=1e-10)
 
 
@@ -258,66 +287,6 @@ def test_restart_continues(before, after, dempm, tmp_path):
     assert deviation(again, through) < (1e-15 if before == after else 1e-13)
 
 
-# ------------------------------------------------------------------------------------------------------- walls
-PLANE = "fix floor all wall/gran model hertz tangential history primitive type 2 zplane 0.0 temperature 500\n"
-MESH = """fix plate all mesh/surface file plate.stl type 2 temperature 500
-fix floor all wall/gran model hertz tangential history mesh n_meshes 1 meshes plate
-"""
-FILES = {"plate.stl": stl(*quad((0, 0, 0), (0.06, 0, 0), (0.06, 0.06, 0), (0, 0.06, 0)))}
-BIG = {"plate.stl": stl(*quad((-0.01, -0.01, 0), (0.08, -0.01, 0), (0.08, 0.08, 0), (-0.01, 0.08, 0)))}
-LYING = [(1, 0.005, 0.03, 0.03, 0.0049, 300.0), (1, 0.004, 0.02, 0.04, 0.0039, 300.0)]  # the second off the diagonal
-
-
-def lying(words, wall, steps=1):
-    """Two grains that overlap with a floor and do not move."""
-    make, heat = grains(LYING)
-    fix = f"fix heat all heat/gran/grain initial_temperature 300 {words}\n"
-    output = OUTPUT.replace("thermo 1000", "thermo 1").replace("f_heat\n", "f_heat f_heat[3]\n")
-    return (box((0, 0, -0.001), (0.06, 0.06, 0.06), "f f f") + make + properties(fix) + fix + wall + heat +
-            output.format(every=1) + f"run {steps}\n")
-
-
-@pytest.mark.parametrize("wall", [PLANE, MESH], ids=["plane", "mesh"])
-@pytest.mark.parametrize("words, conductance", [
-    ("direct batchelor", lambda r, d: 4 * 20 * 90 / 110 * math.sqrt(r * r - d * d)),
-    ("direct batchelor area hertz", lambda r, d: 4 * 20 * 90 / 110 * math.sqrt(r * (r - d))),
-    ("direct liggghts", lambda r, d: 4 * 20 * 90 / 110 * math.sqrt(math.pi * (r * r - d * d))),
-    ("direct pipe", lambda r, d: math.pi * (r * r - d * d) * 20 / d),
-], ids=["batchelor", "hertz", "liggghts", "pipe"])
-def test_walls_conduct_by_the_model(words, conductance, wall, dempm):
-    """One grain lies on the edge between both triangles: they count once."""
-    run = dempm(lying(words, wall), files=FILES)
-    flows = [conductance(row[1], row[4]) * 200.0 for row in LYING]
-    assert last(run, "f_heatFlux[0]") == pytest.approx(flows, rel=1e-10)
-    assert run.table["f_heat[3]"][-1] == pytest.approx(sum(flows), rel=1e-10)
-
-
-def falling_on(wall, fix):
-    return falling(fix, 5000).replace("fix floor all wall/gran model hertz tangential history primitive type 1 zplane "
-                                      "0.0 temperature 500\n", wall)
-
-
-def test_meshes_conduct_as_in_the_stock_fix(dempm, liggghts, tmp_path):
-    ours, two = (dempm(falling_on(MESH, OURS), np=np, files=BIG, cwd=tmp_path / str(np)) for np in (1, 2))
-    stock = liggghts(falling_on(MESH, STOCK), files=BIG, cwd=tmp_path / "stock")
-    unheated = dempm(falling_on(MESH.replace(" temperature 500", ""), OURS), files=BIG, cwd=tmp_path / "unheated")
-    assert deviation(unheated, stock) > 0.01
-    assert last(ours, "z") == last(stock, "z")
-    assert deviation(ours, stock) < 1e-10 and deviation(two, ours) < 1e-10
-
-
-@pytest.mark.parametrize("wall", [PLANE, MESH], ids=["plane", "mesh"])
-def test_heat_of_walls_adds_up_over_several_runs(wall, dempm):
-    """LIGGGHTS takes up its own conduction to walls again whenever a run begins."""
-    run = dempm(lying("direct batchelor", wall, 20) + "run 0\nrun 20\n", files=FILES)
-    for table in (run.thermo[-3], run.thermo[-1]):
-        energy, flow = table["f_heat"], table["f_heat[3]"]
-        assert len(energy) == 21
-        for n in range(1, 21):
-            assert energy[n] - energy[n - 1] == pytest.approx(2e-5 * flow[n], abs=1e-12 * energy[0])
-            assert flow[n] > 0.0
-
-
 # ------------------------------------------------------------------------------------------------ surroundings
 APART = [(1, 0.005, 0.01, 0.01, 0.01, 350.0), (2, 0.004, 0.03, 0.01, 0.01, 250.0)]
 FLOWS = "thermo_style custom step atoms f_heat f_heat[1] f_heat[2]\nthermo_modify format float %.17g\n"
@@ -375,173 +344,3 @@ def test_flows_from_the_surroundings_add_up_to_the_energy(np, dempm):
     assert len(energy) == 51 and min(abs(f) for flow in flows for f in flow[1:]) > 0.0
     for n in range(1, 51):
         assert energy[n] - energy[n - 1] == pytest.approx(1e-3 * (flows[0][n] + flows[1][n]), abs=1e-12 * energy[0])
-
-
-# ---------------------------------------------------------------------------------------------------- friction
-SPRINGS = """
-neighbor 0.001 bin
-neigh_modify delay 0
-fix m1 all property/global kn peratomtypepair 2 4000 3000 3000 2000
-fix m2 all property/global kt peratomtypepair 2 2000 1500 1500 1000
-fix m3 all property/global gamman peratomtypepair 2 0 0 0 0
-fix m4 all property/global gammat peratomtypepair 2 0 0 0 0
-fix m5 all property/global coefficientFriction peratomtypepair 2 0.3 0.3 0.3 0.3
-fix k all property/global thermalConductivity peratomtype 20 90
-fix c all property/global thermalCapacity peratomtype 0.1 0.2
-pair_style gran model hooke/stiffness tangential history
-pair_coeff * *
-timestep {dt}
-fix heat all heat/gran/grain initial_temperature 300 direct none friction yes
-fix move all nve/sphere
-"""
-IMPACT = [(1, 0.005, 0.0150, 0.018, 0.01, 300.0), (2, 0.004, 0.0242, 0.02, 0.011, 300.0)]
-MOVING = """thermo 1
-thermo_style custom step atoms f_heat f_heat[4] ke
-thermo_modify format float %.17g
-dump end all custom {every} end.dump id type radius mass x y z vx vy vz omegax omegay omegaz f_Temp[0]
-dump_modify end sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g"
-"""
-
-
-def impact(dt, speed=0.4, duration=0.008):
-    """Two grains of different size and stiffness hit each other off centre, without damping."""
-    make, heat = grains(IMPACT)
-    push = f"velocity all set 0 0 0\\ngroup one id 1\\nvelocity one set {speed} 0.3 0.4\\n".replace("\\n", "\n")
-    steps = round(duration / dt)
-    return (box((0, 0, 0), (0.04, 0.04, 0.04), "f f f") + make + SPRINGS.format(dt=dt) + push + heat +
-            MOVING.format(every=steps) + f"run {steps}\n")
-
-
-def kinetic(frame):
-    """With spin."""
-    total = 0.0
-    for n, (m, r) in enumerate(zip(frame["mass"], frame["radius"])):
-        total += 0.5 * m * sum(frame["v" + a][n] ** 2 for a in "xyz")
-        total += 0.2 * m * r * r * sum(frame["omega" + a][n] ** 2 for a in "xyz")
-    return total
-
-
-def test_friction_turns_lost_energy_into_heat(dempm, tmp_path):
-    """Kinetic energy lost in the impact = heat gained, but for the error of the time integration; half to each."""
-    errors = []
-    for dt in (4e-6, 2e-6, 1e-6):
-        run = dempm(impact(dt), cwd=tmp_path / str(dt))
-        (_, first), (_, end) = run.dump("end.dump")
-        lost = kinetic(first) - kinetic(end)
-        gained = [m * c * (T - 300.0) for m, c, T in zip(end["mass"], (0.1, 0.2), end["f_Temp[0]"])]
-        assert lost > 0.01 * kinetic(first) and abs(end["omegaz"][0]) > 1.0
-        assert gained[0] == pytest.approx(gained[1], rel=1e-7)
-        assert dt * sum(run.table["f_heat[4]"][1:]) == pytest.approx(sum(gained), rel=1e-7)
-        errors.append(abs(sum(gained) / lost - 1))
-    print("energy closure", errors)
-    assert errors[2] < 1e-4 and errors[2] < 0.7 * errors[1] < 0.49 * errors[0]
-
-
-def sliding():
-    """As `impact`, with a restart file written in the middle of it."""
-    return impact(2e-6, duration=2.6e-3).replace("run 1300\n", "run 650\nwrite_restart half\nrun 650\n")
-
-
-def test_friction_is_the_same_on_two_ranks_and_after_a_restart(dempm, tmp_path):
-    one, two = (dempm(sliding(), np=np, cwd=tmp_path / str(np)) for np in (1, 2))
-    halves = one.thermo[-2:]
-    assert halves[0]["f_heat[4]"][-1] > 0.0 and halves[1]["f_heat[4]"][1] > 0.0  # it slides when the restart is written
-    assert halves[1]["f_heat[4]"] == pytest.approx(two.thermo[-1]["f_heat[4]"], rel=1e-9, abs=1e-12)
-    gains = [[T - 300 for T in last(run, "f_Temp[0]")] for run in (one, two)]
-    assert gains[1] == pytest.approx(gains[0], rel=1e-9)
-    again = dempm(HEAD.format(boundary="f f f") + f"read_restart {tmp_path}/1/half\n" + SPRINGS.format(dt=2e-6) +
-                  MOVING.format(every=650) + "run 650\n", cwd=tmp_path / "again")
-    for name in ("f_Temp[0]", "vx", "vz", "omegaz"):
-        assert last(again, name) == last(one, name)
-    assert again.table["f_heat[4]"][1:] == halves[1]["f_heat[4]"][1:]
-
-
-def gas(steps, size, rows):
-    """Grains that fly about in a periodic box and collide without damping."""
-    make, heat = grains(rows)
-    draw = random.Random(3).uniform
-    push = "".join(f"set atom {n} vx {draw(-1, 1)!r} vy {draw(-1, 1)!r} vz {draw(-1, 1)!r}\n"
-                   for n in range(1, len(rows) + 1))
-    output = MOVING.format(every=steps).replace("thermo 1\n", "thermo 100\n")
-    return (box((0, 0, 0), size, "p p p") + make + SPRINGS.format(dt=1e-6) + push + heat + output + f"run {steps}\n")
-
-
-def normal_springs(frame, size):
-    stiffness = {(1, 1): 4000.0, (1, 2): 3000.0, (2, 2): 2000.0}
-    grain = list(zip(*(frame[name] for name in ("x", "y", "z", "radius", "type"))))
-    total = 0.0
-    for n, a in enumerate(grain):
-        for b in grain[:n]:
-            apart = math.sqrt(sum(((p - q + 1.5 * L) % L - 0.5 * L) ** 2 for p, q, L in zip(a, b, size)))
-            overlap = a[3] + b[3] - apart
-            if overlap > 0.0:
-                total += 0.5 * stiffness[tuple(sorted((int(a[4]), int(b[4]))))] * overlap ** 2
-    return total
-
-
-def test_energy_of_many_colliding_grains_closes(dempm, tmp_path):
-    """Kinetic energy, that of normal springs and heat; the tangential springs of the last instant are left out."""
-    rows, size = packing(0.0125, 0.0002)
-    rows = [(*row[:5], 300.0) for row in rows]
-    runs = [dempm(gas(20000, size, rows), np=np, cwd=tmp_path / str(np)) for np in (1, 2)]
-    for run in runs:
-        (_, first), (_, end) = run.dump("end.dump")
-        capacity = [m * (0.1, 0.2)[int(t) - 1] for m, t in zip(end["mass"], end["type"])]
-        heat = math.fsum(c * (T - 300.0) for c, T in zip(capacity, end["f_Temp[0]"]))
-        mechanical = [kinetic(frame) + normal_springs(frame, size) for frame in (first, end)]
-        print("closure", heat / (mechanical[0] - mechanical[1]) - 1, "of", heat / mechanical[0])
-        assert heat > 0.1 * mechanical[0]
-        assert heat == pytest.approx(mechanical[0] - mechanical[1], rel=5e-3)
-
-
-# -------------------------------------------------------------------------------------------------- collisions
-def bounce(dt, duration=6e-3):
-    """Two grains of different size and type hit each other head on; LIGGGHTS' Hertz without damping, E = 5e6."""
-    rows = [(1, 0.005, 0.0148, 0.01, 0.01, 350.0), (2, 0.004, 0.0240, 0.01, 0.01, 250.0)]
-    make, heat = grains(rows)
-    steps = round(duration / dt)
-    return (box((0, 0, 0), (0.04, 0.02, 0.02), "f f f") + make +
-            PROPERTIES.format(skin=0.001).replace("2e-5", repr(dt)).replace("0.5 0.5 0.5 0.5", "0.999999 0.999999 0.999999 0.999999")
-            .replace("0.1 0.2", "100 200") +
-            "fix heat all heat/gran/grain initial_temperature 300 direct collisional\nfix move all nve/sphere\n"
-            "velocity all set 0 0 0\ngroup one id 1\nvelocity one set 0.2 0 0\n" + heat +
-            MOVING.replace("f_heat[4] ", "").format(every=steps) + f"run {steps}\n")
-
-
-def collisional(masses, speed):
-    """Table 1, corrected, in the order of heat capacities per volume that the formula wants."""
-    radii, k, density = (0.005, 0.004), (20.0, 90.0), 2500.0
-    per_volume = [density * c for c in (100.0, 200.0)]
-    m, r = (a * b / (a + b) for a, b in (masses, radii))
-    stiffness = 5e6 / (2 * (1 - 0.09))
-    widest = (15 * m * r * r * speed ** 2 / (16 * stiffness)) ** 0.2
-    duration = 2.8683 * (m * m / (r * stiffness ** 2 * speed)) ** 0.2
-    ratio, fourier = per_volume[0] / per_volume[1], k[0] * duration / (per_volume[0] * widest ** 2)
-    c1, c2, c3 = (-2.3 * ratio ** 2 + 8.909 * ratio - 4.235, 8.169 * ratio ** 2 - 33.77 * ratio + 24.885,
-                  -5.758 * ratio ** 2 + 24.464 * ratio - 20.511)
-    factor = 0.435 / c1 * (math.sqrt(c2 * c2 - 4 * c1 * (c3 - fourier)) - c2)
-    resistance = sum((c * conductivity) ** -0.5 for c, conductivity in zip(per_volume, k))
-    return factor * math.pi * widest ** 2 / math.sqrt(duration) / resistance, duration
-
-
-def test_an_impact_exchanges_the_collisional_heat(dempm, tmp_path):
-    runs = [dempm(bounce(2e-6), np=np, cwd=tmp_path / str(np)) for np in (1, 2)]
-    masses, (one, two) = last(runs[0], "mass"), last(runs[0], "f_Temp[0]")
-    assert last(runs[0], "vx")[0] < last(runs[0], "vx")[1]  # they have parted
-    h, duration = collisional(masses, 0.2)
-    rate = h * sum(1 / (c * m) for c, m in zip((100.0, 200.0), masses))
-    print("collisional heat", (100.0 - (one - two)) / (-100.0 * math.expm1(-rate * duration)) - 1)
-    assert 100.0 - (one - two) == pytest.approx(-100.0 * math.expm1(-rate * duration), rel=5e-3)
-    heat_of_one, heat_of_two = 100.0 * masses[0] * (one - 350.0), 200.0 * masses[1] * (two - 250.0)
-    assert heat_of_one == pytest.approx(-heat_of_two, rel=1e-9)
-    assert last(runs[1], "f_Temp[0]") == pytest.approx([one, two], rel=1e-12)
-
-
-def test_friction_and_collisions_keep_separate_records(dempm, tmp_path):
-    both = impact(2e-6).replace("fix heat all", "fix y all property/global youngsModulus peratomtype 5e6 5e6\n"
-                                "fix p all property/global poissonsRatio peratomtype 0.3 0.3\nfix heat all")
-    runs = [dempm(script, cwd=tmp_path / str(n))
-            for n, script in enumerate((impact(2e-6), both.replace("direct none", "direct collisional")))]
-    work = [sum(run.table["f_heat[4]"]) for run in runs]
-    assert work[0] > 0.0 and work[1] == work[0]
-    assert last(runs[0], "omegaz") == last(runs[1], "omegaz")
