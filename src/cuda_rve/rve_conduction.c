@@ -17,7 +17,8 @@ int rve_conduction_is_own(const RveScene *scene) {
 
 int rve_conduction_is_same(const RveScene *a, const RveScene *b) {
   const GrainHeat *x = &a->conduction, *y = &b->conduction;
-  if (a->network != b->network || a->conductivity_every != b->conductivity_every || has_pipes(a) != has_pipes(b)) return 0;
+  if (a->network != b->network || a->conductivity_every != b->conductivity_every || has_pipes(a) != has_pipes(b))
+    return 0;
   if (a->network && a->network_change != b->network_change) return 0;
   if (has_pipes(a)) return a->pipe_resistance == b->pipe_resistance;
   return a->grain_conductivity == b->grain_conductivity && x->area == y->area && x->direct == y->direct &&
@@ -58,10 +59,12 @@ typedef struct Gathering {
   RveNetwork *network;
 } Gathering;
 
-static BaseStatus gather_pair(void *context, int i, int j, const int image[3], const double branch[3], double distance) {
+static BaseStatus gather_pair(void *context, int i, int j, const int image[3], const double branch[3],
+                              double distance) {
   const Gathering *to = context;
   const double *radius = to->packing->radius;
-  RveLink link = {{i, j}, {branch[0], branch[1], branch[2]}, pair_conductance(to->scene, radius[i], radius[j], distance)};
+  RveLink link = {
+      {i, j}, {branch[0], branch[1], branch[2]}, pair_conductance(to->scene, radius[i], radius[j], distance)};
   (void)image;
   if (to->scene->dimension == 2) link.branch[2] = 0.0;
   return link.conductance > 0.0 ? rve_network_add(to->network, &link) : BASE_OK;
@@ -86,7 +89,7 @@ static BaseStatus gather(const RveRecord *record, const RveScene *scene, RveNetw
                                                            : gather_near(record, scene, network);
 }
 
-/* ------------------------------------------------------------------------------------------ from solution to solution */
+/* ---------------------------------------------------------------------------------------- from solution to solution */
 
 static void full(const double k[6], double a[3][3]) {
   a[0][0] = k[0], a[1][1] = k[1], a[2][2] = k[2];
@@ -109,9 +112,9 @@ static int factorise(int dimension, const double k[6], double l[3][3]) {
   return 1;
 }
 
-/* What the network's k has become since it was solved, if in the frame in which the affine k is the unit tensor it has not
- * changed: m k_solved m^T, m the triangular map that makes the affine k of then that of now. It stays below the affine k, and
- * is exact while the packing deforms affinely as a crystal does. 0 if there is no such map. */
+/* What the network's k has become since it was solved, if in the frame in which the affine k is the unit tensor it has
+ * not changed: m k_solved m^T, m the triangular map that makes the affine k of then that of now. It stays below the
+ * affine k, and is exact while the packing deforms affinely as a crystal does. 0 if there is no such map. */
 static int carry(int dimension, const RveConduction *conduction, const double affine[6], double k[6]) {
   double then[3][3], now[3][3], solved[3][3], map[3][3] = {{0.0}}, half[3][3] = {{0.0}}, result[3][3] = {{0.0}};
   if (!factorise(dimension, conduction->solved_affine, then) || !factorise(dimension, affine, now)) return 0;
@@ -147,7 +150,8 @@ static double relative_change(const double a[6], const double b[6]) {
 static int keeps_solution(const RveScene *scene, const RveConduction *conduction, const double affine[6], double k[6]) {
   const double allowed = scene->network_change;
   return conduction->has_solution && conduction->path <= allowed &&
-         relative_change(affine, conduction->solved_affine) <= allowed && carry(scene->dimension, conduction, affine, k);
+         relative_change(affine, conduction->solved_affine) <= allowed &&
+         carry(scene->dimension, conduction, affine, k);
 }
 
 static BaseStatus work_out(RveRecord *record, const RveScene *scene, RveConductionWork *work) {
@@ -203,7 +207,8 @@ typedef struct Conductor {
 } Conductor;
 
 /* limit: the largest stable time step, s. */
-static BaseStatus conductor_create(const RveRecord *record, const RveScene *scene, Conductor *conductor, double *limit) {
+static BaseStatus conductor_create(const RveRecord *record, const RveScene *scene, Conductor *conductor,
+                                   double *limit) {
   const RveArrays *a = &record->arrays;
   const int grains = record->counts.grains;
   memset(conductor, 0, sizeof *conductor);

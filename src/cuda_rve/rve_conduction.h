@@ -18,8 +18,9 @@ int rve_conduction_is_own(const RveScene *scene);
 int rve_conduction_is_same(const RveScene *a, const RveScene *b);
 /* Nothing is known: the next answer is worked out. */
 void rve_conduction_forget(RveConduction *conduction);
-/* Completes record->last after the kernels' measure of a call of `duration` with this input (both 0: the present state is
- * asked for again, and answered as before). BASE_ERROR_UNSTABLE: the network could not be solved; BASE_ERROR_MEMORY. */
+/* Completes record->last after the kernels' measure of a call of `duration` with this input (both 0: the present state
+ * is asked for again, and answered as before). BASE_ERROR_UNSTABLE: the network could not be solved; BASE_ERROR_MEMORY.
+ */
 BaseStatus rve_conduction_answer(RveRecord *record, const RveScene *scene, const RveInput *input, double duration,
                                  RveConductionWork *work);
 

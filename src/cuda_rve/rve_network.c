@@ -64,7 +64,8 @@ static BaseStatus reserve(RveNetwork *network, int grains) {
   return BASE_OK;
 }
 
-/* Rows of -(off-diagonal part), in the order of the links; links of a grain with itself carry no difference of rises. */
+/* Rows of -(off-diagonal part), in the order of the links; links of a grain with itself carry no difference of rises.
+ */
 static void fill_rows(RveNetwork *network, int grains) {
   int32_t *first = network->first;
   double *diagonal = network->inverse_diagonal;
@@ -94,9 +95,9 @@ static void fill_rows(RveNetwork *network, int grains) {
   for (int i = 0; i < grains; i++) diagonal[i] = diagonal[i] > 0.0 ? 1.0 / diagonal[i] : 0.0;
 }
 
-/* supply: the heat that the affine temperatures of a unit gradient along `axis` bring to each grain, W m/K; gross: the same
- * without signs. Returns the square of gross in the norm of the preconditioner: in a crystal the supply is nothing but
- * round-off of it. */
+/* supply: the heat that the affine temperatures of a unit gradient along `axis` bring to each grain, W m/K; gross: the
+ * same without signs. Returns the square of gross in the norm of the preconditioner: in a crystal the supply is nothing
+ * but round-off of it. */
 static double fill_supply(const RveNetwork *network, int grains, int axis, double *supply, double *gross) {
   double square = 0.0;
   memset(supply, 0, (size_t)grains * sizeof *supply);
@@ -131,7 +132,8 @@ static double precondition(const RveNetwork *network, int grains, const double *
   return product;
 }
 
-/* Conjugate gradients: Laplacian x = work[0], which is used up. goal: square of the residual, in the preconditioner's norm. */
+/* Conjugate gradients: Laplacian x = work[0], which is used up. goal: square of the residual, in the preconditioner's
+ * norm. */
 static BaseStatus solve(RveNetwork *network, int grains, double goal, double *x) {
   double *r = network->work[0], *z = network->work[1], *p = network->work[2], *q = network->work[3];
   memset(x, 0, (size_t)grains * sizeof *x);
@@ -141,7 +143,8 @@ static BaseStatus solve(RveNetwork *network, int grains, double goal, double *x)
   for (int round = 0; rho > goal; round++) {
     const double curvature = apply(network, grains, p, q);
     if (round == most || !(curvature > 0.0))
-      return base_error(BASE_ERROR_UNSTABLE, "the network's residual is still %.2g times the one allowed after %d iterations",
+      return base_error(BASE_ERROR_UNSTABLE,
+                        "the network's residual is still %.2g times the one allowed after %d iterations",
                         sqrt(rho / goal), round);
     const double step = rho / curvature;
     for (int i = 0; i < grains; i++) x[i] += step * p[i], r[i] -= step * q[i];

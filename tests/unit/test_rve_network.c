@@ -62,7 +62,8 @@ static void solve_dense(const RveNetwork *network, int grains, int dimension, do
     const RveLink *link = &network->link[l];
     const int i = link->pair[0], j = link->pair[1];
     double d[3] = {0.0};
-    for (int m = 0; m < dimension; m++) d[m] = link->branch[m] + a[j][grains + m] / a[j][j] - a[i][grains + m] / a[i][i];
+    for (int m = 0; m < dimension; m++)
+      d[m] = link->branch[m] + a[j][grains + m] / a[j][j] - a[i][grains + m] / a[i][i];
     for (int m = 0; m < 6; m++) sum[m] += link->conductance * d[row[m]] * link->branch[column[m]];
   }
   for (int m = 0; m < 6; m++) k[m] = sum[m] / volume;
@@ -158,14 +159,16 @@ static RveScene model_scene(int dimension, int model) {
 /* All neighbours of a lattice up to three cells away: the affine sum, which is that of the network. */
 static void lattice_sum(const RvePacking *cell, const RveScene *scene, double k[6]) {
   const int deep = scene->dimension == 3 ? 3 : 0;
-  const double volume = tensor_determinant(cell->cell) * (scene->dimension == 2 ? scene->thickness : 1.0), r = cell->radius[0];
+  const double volume = tensor_determinant(cell->cell) * (scene->dimension == 2 ? scene->thickness : 1.0),
+               r = cell->radius[0];
   double sum[9] = {0.0};
   for (int x = -3; x <= 3; x++)
     for (int y = -3; y <= 3; y++)
       for (int z = -deep; z <= deep; z++) {
         double b[3], h;
         if (x == 0 && y == 0 && z == 0) continue;
-        for (int i = 0; i < 3; i++) b[i] = cell->cell[3 * i] * x + cell->cell[3 * i + 1] * y + cell->cell[3 * i + 2] * z;
+        for (int i = 0; i < 3; i++)
+          b[i] = cell->cell[3 * i] * x + cell->cell[3 * i + 1] * y + cell->cell[3 * i + 2] * z;
         const double length = sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
         const GrainPair pair = {{r, r}, {scene->grain_conductivity, scene->grain_conductivity}, length};
         if (isnan(scene->pipe_resistance)) h = grain_heat_conductance(&scene->conduction, &pair);
@@ -228,7 +231,8 @@ static void packings_meet_the_dense_solution_below_the_affine_sum(void **state) 
             const GrainPair pair = {{view.radius[i], view.radius[j]}, {1.4, 1.4}, length};
             const double h = model == 0 ? 1.0 / (1000.0 * length) : grain_heat_conductance(&scene.conduction, &pair);
             if (pass == 0) from = c == 0 ? i : from;
-            else add(&network, i == from ? 0 : i == 0 ? from : i, j == from ? 0 : j == 0 ? from : j, b[0], b[1], b[2], h);
+            else
+              add(&network, i == from ? 0 : i == 0 ? from : i, j == from ? 0 : j == 0 ? from : j, b[0], b[1], b[2], h);
           }
         for (int i = 1; i < view.grains; i++) add(&network, 0, i, 0.0, 0.0, 0.0, 1e-30); /* holds rattlers */
         solve_dense(&network, view.grains, dimension, answer.volume, expected);
@@ -244,7 +248,7 @@ static void packings_meet_the_dense_solution_below_the_affine_sum(void **state) 
   }
 }
 
-/* ------------------------------------------------------------------------------------------------- when it is solved */
+/* ------------------------------------------------------------------------------------------------ when it is solved */
 
 static const double shear[9] = {-0.5, 0.3, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0};
 enum { CALLS = 60 }; /* of 1e-3 s: 0.03 of strain in all */
@@ -274,7 +278,8 @@ static void kept_networks_stay_near_solved_ones(void **state) {
     printf("           %s: %d of %d networks solved\n", model ? "batchelor" : "pipes", (int)solved, CALLS + 1);
     help_report("largest deviation of those kept", largest);
     assert_true(solved >= 4 && kept >= 10);
-    assert_true(largest < 0.05); /* a contact more or less is 0.5 % of 100 grains' conductivity; see doc/fix_mpm_rve.md */
+    assert_true(largest <
+                0.05); /* a contact more or less is 0.5 % of 100 grains' conductivity; see doc/fix_mpm_rve.md */
     rve_batch_destroy(each);
     rve_batch_destroy(some);
   }

@@ -28,11 +28,15 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 from peer_rve import BUILD, ROOT, Packing, execute, generate, settle  # noqa: E402
 from report import Report  # noqa: E402
 
-GRAINS, RADII, DENSITY, KN, SOLID = 400, (0.004, 0.005), 2650.0, 1e6, 1.4  # SOLID: conductivity, W/(m K)
+GRAINS, RADII, DENSITY, KN, SOLID = 400, (0.004, 0.005), 2650.0, 1e5, 1.4  # SOLID: conductivity, W/(m K)
 COPIES, ENDS = 4, 3.0  # in a row; thickness of either end in the largest radii
-DT, STEPS, STEPS_DEAR, STEP_SHARE = 1e-6, 2000, 400, 4.0  # a mean particle's temperature moves by 1/STEP_SHARE of what its neighbours ask in a step
+DT = 1e-6
+# (share, steps): a mean particle's temperature moves by 1/share of what its neighbours ask in a step. Particles with much better
+# contacts than the mean one need a larger share to be stable, and more steps. The next is tried if the first is not steady.
+MARCHES, STEADY = [(4.0, 1000), (10.0, 3000), (30.0, 10000)], 1e-3
 GAS = 0.026
-PACKINGS = [(pressure, friction) for friction in (0.01, 0.5) for pressure in (1e3, 1e4, 1e5, 1e6)]
+# Pressure, preparation friction. Loose packings at less pressure do not survive the step to an orthogonal cell.
+PACKINGS = [(3e3, 0.01), (3e4, 0.01), (3e5, 0.01), (3e4, 0.5), (1e5, 0.5), (3e5, 0.5)]
 MODELS = {
     "batchelor": dict(direct="batchelor"),
     "batchelor, hertz": dict(direct="batchelor", area="hertz"),
@@ -114,8 +118,16 @@ def row_of_copies(packing, dimension):
     return "\n".join(text) + "\n", np.array([place[0] for place in places]), np.array(ends)
 
 
-def full_dem(packing, dimension, folder, model, affine):
+def full_dem(*arguments):
     """(conductivity W/(m K), mean heat that a particle still takes over the mean that flows through one)"""
+    for share, steps in MARCHES:
+        found, unsteady = march(*arguments, share, steps)
+        if unsteady < STEADY:
+            break
+    return found, unsteady
+
+
+def march(packing, dimension, folder, model, affine, share, steps):
     text, x, _ = row_of_copies(packing, dimension)
     (folder / "row.data").write_text(text)
     edge, largest, grains = packing.edge, max(packing.radius), len(packing.radius)
@@ -124,9 +136,9 @@ def full_dem(packing, dimension, folder, model, affine):
     conductance = 2 * dimension * affine * section * edge[0] / (grains * branch ** 2)  # sum of a mean particle's, W/K
     slope = 10.0 / edge[0]
     temperatures = "\n".join(f"set atom {i + 1} property/atom Temp {300 + slope * at!r}" for i, at in enumerate(x))
-    script = SCRIPT.format(dimension=dimension, skin=0.9 * largest, solid=SOLID, capacity=STEP_SHARE * conductance * DT, dt=DT,
+    script = SCRIPT.format(dimension=dimension, skin=0.9 * largest, solid=SOLID, capacity=share * conductance * DT, dt=DT,
                            words=words_of(model), temperatures=temperatures,
-                           steps=STEPS_DEAR if model.get("indirect") == "voronoi_a" else STEPS)
+                           steps=steps)
     (folder / "in.script").write_text(script)
     code, output = execute([BUILD / "dempm", "-in", "in.script", "-log", "none"], cwd=folder)
     assert code == 0, output[-3000:]
@@ -198,18 +210,20 @@ def compare_packings(folder, report):
         rows.append({**row, "pressure": pressure, "friction": friction})
         report.check(f"network against full DEM, batchelor, {pressure:g} Pa, friction {friction:g}", abs(row["network"]), 0.01,
                      time.monotonic() - start)
+        report.check(f"unsteadiness of full DEM, {pressure:g} Pa, friction {friction:g}", row["unsteady"], STEADY, 0.0)
         assert row["affine"] > row["network"], "the affine sum is an upper bound"
     return rows
 
 
 def compare_models(folder, report):
-    for dimension in (3, 2):
-        packing, data = make(folder, dimension, 1e5, 0.5)
+    for dimension, pressure in ((3, 1e5), (2, 1e3)):
+        packing, data = make(folder, dimension, pressure, 0.5)
         for name, model in MODELS.items():
             start = time.monotonic()
             print(f"{dimension}D, {name}", flush=True)
             row = compare(folder, dimension, packing, data, model)
             report.check(f"network against full DEM, {dimension}D, {name}", abs(row["network"]), 0.01, time.monotonic() - start)
+            report.check(f"unsteadiness of full DEM, {dimension}D, {name}", row["unsteady"], STEADY, 0.0)
             report.check(f"affine sum above full DEM, {dimension}D, {name}", row["affine"], None, 0.0)
             assert row["affine"] > row["network"], "the affine sum is an upper bound"
 
@@ -240,7 +254,7 @@ def mean_overlap(row):
 
 
 def draw_beds(panel, folder):
-    packing, data = make(folder, 3, 1e3, 0.01)
+    packing, data = make(folder, 3, 3e3, 0.01)
     ratios = np.logspace(1, 5, 9)
     porosity = 0.0
     for indirect, mark in (("voronoi_a", "s-"), ("voronoi_b", "o-")):
