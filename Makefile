@@ -176,7 +176,7 @@ demo: programs
 
 # Compares with LAMMPS and YADE too where they are installed.
 validate: programs $(TOOLS)
-	$(foreach s,rve_stability rve_quasi_static rve_against_peers,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
+	$(foreach s,rve_stability rve_quasi_static rve_against_peers rve_conductivity,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
 # The cases of TM-DEMPM; -full: the papers' sizes, hours to days. Finished runs are not repeated.
 verify: programs
 	$(RUN_ENV) $(PYTHON) tests/verify/verify.py $(CASES)

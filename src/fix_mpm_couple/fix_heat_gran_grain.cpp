@@ -6,6 +6,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "conduction_keywords.h"
 #include "fix_property_atom.h"
 #include "force.h"
 #include "keyword_parser.h"
@@ -49,10 +50,10 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
   vector_flag = 1;
   size_vector = FLOWS;
   extvector = 1;
-  KeywordParser parser(lmp, this, narg, arg, 3,
-                       {"initial_temperature", "direct", "area", "area_correction", "indirect", "fluid", "porosity",
-                        "core", "reach", "layer", "minimum_gap", "convection", "radiation", "absolute_zero",
-                        "conductivity", "capacity", "friction", "damping"});
+  std::vector<std::string> keywords = {"initial_temperature", "area_correction", "convection", "radiation",
+                                       "absolute_zero", "conductivity", "capacity", "friction", "damping"};
+  keywords.insert(keywords.begin() + 1, CONDUCTION_KEYWORDS.begin(), CONDUCTION_KEYWORDS.end());
+  KeywordParser parser(lmp, this, narg, arg, 3, keywords);
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
@@ -68,18 +69,8 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
 void FixHeatGranGrain::read_model(KeywordParser &parser) {
   while (parser.next()) {
     if (parser.is("initial_temperature")) T0 = parser.number(NumberRange::any());
-    else if (parser.is("direct"))
-      model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe", "collisional"});
-    else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
     else if (parser.is("area_correction")) correction_ = parser.yes_no();
-    else if (parser.is("indirect"))
-      model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
-    else if (parser.is("fluid")) model_.fluid = parser.number(NumberRange::positive());
-    else if (parser.is("porosity")) model_.porosity = parser.number(NumberRange::inside(0.0, 1.0));
-    else if (parser.is("core")) model_.core = parser.number(NumberRange::inside(0.0, 1.0));
-    else if (parser.is("reach")) model_.reach = parser.number(NumberRange::positive());
-    else if (parser.is("layer")) model_.layer = parser.number(NumberRange::positive());
-    else if (parser.is("minimum_gap")) model_.minimum_gap = parser.number(NumberRange::positive());
+    else if (read_conduction(parser, model_, true)) continue;
     else if (parser.is("convection")) {
       convection_ = true;
       surface_.coefficient = parser.number(NumberRange::at_least(0.0));
@@ -119,25 +110,11 @@ void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
 
 /* A keyword that the model does not use is a mistake in the script. */
 void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
-  const GrainIndirect a = GRAIN_INDIRECT_VORONOI_A, b = GRAIN_INDIRECT_VORONOI_B, layer = GRAIN_INDIRECT_LAYER;
-  const bool faces = model_.indirect == a || model_.indirect == b || neighbours_;
+  check_conduction(parser, model_, neighbours_);
   const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
-  const struct {
-    const char *keyword, *models;
-    bool used;
-  } uses[] = {{"area_correction", "a direct or an indirect model", conducts},
-              {"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
-              {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
-              {"porosity", "'indirect voronoi_a', 'voronoi_b' or 'radiation ... neighbours'", faces},
-              {"reach", "'indirect voronoi_a', 'voronoi_b' or 'radiation ... neighbours'", faces},
-              {"core", "'indirect voronoi_b'", model_.indirect == b},
-              {"layer", "'indirect layer'", model_.indirect == layer},
-              {"minimum_gap", "'indirect layer'", model_.indirect == layer}};
-  for (const auto &use : uses)
-    if (parser.given(use.keyword) && !use.used)
-      parser.fail(std::string("keyword '") + use.keyword + "' has a meaning with " + use.models + " only");
+  if (parser.given("area_correction") && !conducts)
+    parser.fail("keyword 'area_correction' has a meaning with a direct or an indirect model only");
   if (damping_ && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
-  if (model_.indirect != GRAIN_INDIRECT_NONE) parser.require("fluid", "fluid K, the conductivity of the fluid");
 }
 
 int FixHeatGranGrain::setmask() {
