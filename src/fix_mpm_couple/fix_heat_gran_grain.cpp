@@ -210,14 +210,20 @@ void FixHeatGranGrain::post_integrate() {
   if (2.0 * sqrt(all) > neighbor->skin - reach_) next_reneighbor = update->ntimestep;
 }
 
+GrainPair FixHeatGranGrain::pair_of(int i, int j) const {
+  double **x = atom->x;
+  const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+  const int *type = atom->type;
+  return {{atom->radius[i], atom->radius[j]},
+          {conductivity_[type[i]], conductivity_[type[j]]},
+          sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
+}
+
 /* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
 void FixHeatGranGrain::exchange(int i, int j, double *record) {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
-  const int *type = atom->type;
-  const GrainPair pair = {{atom->radius[i], atom->radius[j]},
-                          {conductivity_[type[i]], conductivity_[type[j]]},
-                          sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2])};
+  const GrainPair pair = pair_of(i, j);
   const double conductance = record ? collide(i, j, pair, record) : grain_heat_conductance(&model_, &pair);
   if (conductance == 0.0) return;
   const double flow = (Temp[j] - Temp[i]) * conductance;
@@ -265,14 +271,18 @@ void FixHeatGranGrain::post_force(int) {
   }
 }
 
+double FixHeatGranGrain::wall_conductance(const WallContact &contact) const {
+  const double k[2] = {conductivity_[atom->type[contact.grain]], conductivity_[contact.type]};
+  return grain_heat_wall_conductance(&model_, atom->radius[contact.grain], k, contact.distance);
+}
+
 /* Here and not in post_force(): walls may come after this fix. */
 void FixHeatGranGrain::pre_final_integrate() {
   updatePtrs();
   for (const WallContact &contact : walls_.find_contacts()) {
     const int i = contact.grain;
     if (!(atom->mask[i] & groupbit)) continue;
-    const double k[2] = {conductivity_[atom->type[i]], conductivity_[contact.type]};
-    const double h = grain_heat_wall_conductance(&model_, atom->radius[i], k, contact.distance);
+    const double h = wall_conductance(contact);
     const double flow = h * (contact.temperature - Temp[i]);
     heatFlux[i] += flow;
     flow_[WALLS].add(flow);

@@ -47,6 +47,7 @@ class FixHeatGranGrain : public FixHeatGran {
   bool history_args(char **);
 
  private:
+  friend class FixHeatRest; /* steps the same temperatures by the same conductances, while the grains are at rest */
   enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, FLOWS };
 
   GrainHeat model_;
@@ -76,6 +77,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void find_walls();
   void keep_positions();
   void check_radiation(const class KeywordParser &) const;
+  GrainPair pair_of(int i, int j) const;
+  double wall_conductance(const WallContact &contact) const;
   void exchange(int i, int j, double *record);
   void exchange_with_surroundings();
 };

@@ -8,6 +8,7 @@
 
 #include "fix.h"
 #include "fix_heat_gran_grain.h"
+#include "fix_heat_rest.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
 #include "fix_mpm_traction.h"
@@ -69,6 +70,7 @@ void LAMMPS_NS::register_styles(LAMMPS *lmp) {
 #define FIX_CLASS
 #define FixStyle(key, Class) map[#key] = &create<Class>;
 #include "fix_heat_gran_grain.h"
+#include "fix_heat_rest.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
 #include "fix_mpm_traction.h"

@@ -10,6 +10,11 @@ double grain_convection(const GrainSurface *exchange, double radius, double temp
   return exchange->coefficient * surface(radius) * (exchange->fluid_temperature - temperature);
 }
 
+double grain_radiation_conductance(const GrainSurface *exchange, double radius, double temperature) {
+  const double hot = exchange->surroundings - exchange->absolute_zero, own = temperature - exchange->absolute_zero;
+  return STEFAN_BOLTZMANN * exchange->emissivity * surface(radius) * (hot + own) * (hot * hot + own * own);
+}
+
 /* The difference of fourth powers as a product: no digits are lost near the temperature of the surroundings. */
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature) {
   const double hot = exchange->surroundings - exchange->absolute_zero, own = temperature - exchange->absolute_zero;
