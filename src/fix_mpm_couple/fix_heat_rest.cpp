@@ -140,10 +140,10 @@ void FixHeatRest::check_integration() {
     fix_failed(lmp, this, format_text("the run_style is %s, allowed is verlet", update->integrate_style));
   FixScalarTransportEquation *equation = modify->find_fix_scalar_transport_equation("heattransfer");
   if (!equation) fix_failed(lmp, this, "LIGGGHTS' fix transportequation/scalar for the temperature is missing");
-  if (!(equation->*Access::integrates()) || equation->n_every() != 1 || equation->isImplicit())
+  if (!(equation->*Access::integrates()))
     fix_failed(lmp, this,
-               format_text("the integration of fix %s was changed (fix_modify integrate, every): allowed is 'integrate start "
-                           "every 1'",
+               format_text("the integration of temperatures was stopped (fix_modify %s integrate stop): allowed is "
+                           "'integrate start'",
                            equation->id));
 }
 
