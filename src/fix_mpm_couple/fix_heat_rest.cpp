@@ -27,8 +27,8 @@ namespace {
 const int MOST_ITERATIONS = 20000;
 const double SMALLEST_CAPACITY = 1e-8; /* J/(kg K): below, LIGGGHTS keeps the temperature */
 
-/* LIGGGHTS' set-up of a run (neighbours, one evaluation of forces, walls' contacts), then steps of temperature only. Output and
- * fixes that act at the end of a step see them as they see others. */
+/* LIGGGHTS' set-up of a run (neighbours, one evaluation of forces, walls' contacts), then steps of temperature only.
+ * Output and fixes that act at the end of a step see them as they see others. */
 class RestIntegrate : public Verlet {
  public:
   RestIntegrate(LAMMPS *lammps, FixHeatRest *fix) : Verlet(lammps, 0, NULL), fix_(fix) {}
@@ -83,7 +83,8 @@ FixHeatRest::FixHeatRest(LAMMPS *lammps, int narg, char **arg)
   extvector = 0;
   comm_forward = 1;
   if (strcmp(arg[1], "all") != 0)
-    fix_failed(lmp, this, format_text("the group is %s, allowed is all: the particles are those of fix heat/gran/grain", arg[1]));
+    fix_failed(lmp, this,
+               format_text("the group is %s, allowed is all: the particles are those of fix heat/gran/grain", arg[1]));
   KeywordParser parser(lmp, this, narg, arg, 3, {"solver", "tolerance"});
   while (parser.next()) {
     if (parser.is("solver")) solver_ = (Solver)parser.choice({"explicit", "implicit", "steady"});
@@ -126,8 +127,8 @@ void FixHeatRest::find_heat() {
       fix_failed(lmp, this, format_text("there is another fix %s (id %s)", style, fix->id));
     if (strncmp(fix->style, "mpm/couple", 10) == 0)
       fix_failed(lmp, this,
-                 format_text("fix %s (id %s) moves material points, but nothing moves in runs with this fix: remove one of "
-                             "them (unfix)",
+                 format_text("fix %s (id %s) moves material points, but nothing moves in runs with this fix: remove "
+                             "one of them (unfix)",
                              fix->style, fix->id));
   }
   if (!heat_)
@@ -202,8 +203,8 @@ void FixHeatRest::collect_baths(std::vector<GrainBath> &baths) {
 
 void FixHeatRest::set_capacities() {
   const int types = (int)heat_->conductivity_.size() - 1;
-  FixPropertyGlobal *specific =
-      static_cast<FixPropertyGlobal *>(modify->find_fix_property("thermalCapacity", "property/global", "peratomtype", types, 0, style));
+  FixPropertyGlobal *specific = static_cast<FixPropertyGlobal *>(
+      modify->find_fix_property("thermalCapacity", "property/global", "peratomtype", types, 0, style));
   network_->surface = heat_->surface_;
   for (int i = 0; i < atom->nlocal; i++) {
     const double c = specific->compute_vector(atom->type[i] - 1);
@@ -227,8 +228,9 @@ void FixHeatRest::find_limit(bool check) {
   int tag = grain < 0 ? 0 : atom->tag[grain];
   MPI_Bcast(&tag, 1, MPI_INT, least_rank, world);
   fix_failed(lmp, this,
-             format_text("the time step (command timestep) is %g s; allowed with 'solver explicit' is a number <= %g, the heat "
-                         "capacity of particle %d over the sum of its conductances; 'solver implicit' has no limit",
+             format_text("the time step (command timestep) is %g s; allowed with 'solver explicit' is a number <= %g, "
+                         "the heat capacity of particle %d over the sum of its conductances; 'solver implicit' has no "
+                         "limit",
                          update->dt, limit_, tag));
 }
 
@@ -257,13 +259,14 @@ void FixHeatRest::solve() {
   const GrainRanks all = ranks();
   const double step = solver_ == STEADY ? HUGE_VAL : update->dt;
   fix_check(lmp, this,
-            grain_network_solve(network_, &all, step, tolerance_, MOST_ITERATIONS, heat_->heatSource, heat_->Temp, &solution_));
+            grain_network_solve(network_, &all, step, tolerance_, MOST_ITERATIONS, heat_->heatSource, heat_->Temp,
+                                &solution_));
 }
 
 void FixHeatRest::keep_flows(const GrainSum *flows) {
-  const int to[GRAIN_BATH_KINDS] = {FixHeatGranGrain::CONVECTION, FixHeatGranGrain::RADIATION, FixHeatGranGrain::WALLS};
+  const int to[] = {FixHeatGranGrain::CONVECTION, FixHeatGranGrain::RADIATION, FixHeatGranGrain::WALLS};
   for (DoubleSum &flow : heat_->flow_) flow = DoubleSum();
-  for (int k = 0; k < GRAIN_BATH_KINDS; k++) heat_->flow_[to[k]].high = flows[k].high, heat_->flow_[to[k]].low = flows[k].low;
+  for (int k = 0; k < GRAIN_BATH_KINDS; k++) heat_->flow_[to[k]] = {flows[k].high, flows[k].low};
 }
 
 void FixHeatRest::direct_flux() {

@@ -50,9 +50,9 @@ class FixHeatRest : public Fix {
   Integrate *mine_, *theirs_; /* this fix's integrator, and the one whose place it takes (owned while it does) */
   GrainNetwork *network_;
   GrainSolution solution_;
-  double limit_;                 /* s */
-  double pairs_, walls_;         /* on all ranks */
-  double *spread_;               /* what pack_comm() sends */
+  double limit_;         /* s */
+  double pairs_, walls_; /* on all ranks */
+  double *spread_;       /* what pack_comm() sends */
 
   void find_heat();
   void check_integration();

@@ -125,8 +125,8 @@ typedef struct Solver {
   double *direction, *residual, *image; /* the direction has copies */
 } Solver;
 
-/* residual = flows + source at T = T0. Returns sum residual^2 / C; *scale: sum of squares / C of the heat that flows into
- * or out of each grain; *noise: the same of what round-off of the temperatures makes of it. */
+/* residual = flows + source at T = T0. Returns sum residual^2 / C; *scale: sum of squares / C of the heat that flows
+ * into or out of each grain; *noise: the same of what round-off of the temperatures makes of it. */
 static double start(Solver *s, const double *source, const double *T, double *scale, double *noise) {
   const GrainNetwork *n = s->network;
   GrainSum sums[3] = {{0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}}, flows[GRAIN_BATH_KINDS];

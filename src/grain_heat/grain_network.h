@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Grains at rest as a network of conductances that is set up once: heat flows, explicit steps, implicit steps and steady
- * states. One rank's part; what others know comes by GrainRanks.
+/* Grains at rest as a network of conductances that is set up once: heat flows, explicit steps, implicit steps and
+ * steady states. One rank's part; what others know comes by GrainRanks.
  *
  * C_i dT_i/dt = SUM_j h_ij (T_j - T_i) + SUM_b h_b (T_b - T_i) + s_i, with baths b: walls, fluid, surroundings. */
 #ifndef DEMPM_GRAIN_NETWORK_H
@@ -50,13 +50,14 @@ typedef struct GrainNetwork {
   double *work; /* of the solver */
 } GrainNetwork;
 
-/* Sorts `links` and keeps copies of both lists. `copies`: temperatures beyond those of the grains. BASE_ERROR_MEMORY. */
+/* Sorts `links` and keeps copies of both lists. `copies`: temperatures beyond those of the grains.
+ * BASE_ERROR_MEMORY. */
 BaseStatus grain_network_create(int grains, int copies, int64_t links, GrainLink *link, int baths,
                                 const GrainBath *bath, GrainNetwork **network);
 void grain_network_destroy(GrainNetwork *network); /* accepts NULL */
 
-/* Sums of the baths' conductances, with those of radiation at the temperatures T. Needed after creation, and before each
- * step if there is radiation. */
+/* Sums of the baths' conductances, with those of radiation at the temperatures T. Needed after creation, and before
+ * each step if there is radiation. */
 void grain_network_refresh(GrainNetwork *network, const double *T);
 /* min C / sum h over the grains of this rank, s; HUGE_VAL if nothing conducts. An explicit step up to it keeps each new
  * temperature between those around it. *grain: the grain it belongs to, -1 if none. */
@@ -86,8 +87,8 @@ typedef struct GrainSolution {
   double residual; /* heat that is not balanced, over the heat that flows through grains (norms weighted by 1/C) */
 } GrainSolution;
 
-/* Backward Euler: C (T - T0) / step = flows at T + source; step = HUGE_VAL: the steady state. T (with its copies) goes from
- * T0 to T. Conjugate gradients, until the residual is below `tolerance` or lost in round-off. The capacity is the
+/* Backward Euler: C (T - T0) / step = flows at T + source; step = HUGE_VAL: the steady state. T (with its copies) goes
+ * from T0 to T. Conjugate gradients, until the residual is below `tolerance` or lost in round-off. The capacity is the
  * preconditioner: no iterate then changes the heat of grains that no bath reaches, which is kept to round-off whatever
  * the tolerance. A group of grains without baths so has a steady state, its mean; with sources it has none:
  * BASE_ERROR_UNSTABLE after `most` iterations, on all ranks. */

@@ -89,7 +89,8 @@ static void heat_is_kept(void **state) {
         grain_network_flow(n, T, heat, flows);
         grain_network_advance(n, limit, heat, source, T);
       } else
-        assert_int_equal(grain_network_solve(n, &ALONE, k == 1 ? 5.0 : HUGE_VAL, 0.1, MOST, source, T, &solution), BASE_OK);
+        assert_int_equal(
+            grain_network_solve(n, &ALONE, k == 1 ? 5.0 : HUGE_VAL, 0.1, MOST, source, T, &solution), BASE_OK);
     }
     AT_MOST(fabs(energy_of(n, T) / before - 1.0), 1e-13);
     grain_network_destroy(n);

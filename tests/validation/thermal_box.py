@@ -7,7 +7,7 @@ continuum with the homogenised conductivity and with that of the grains; thermal
    thermal_box.py        from the root, after `make`
 
 The paper gives no stiffness, hence no contact radius. Here the grains settle under their weight and a lid is lowered to 0.6 m,
-without which they do not fit: their area is 0.918 of the box (the paper's 2296.3 kg/m3), that of a loose packing 0.84. The
+without which they do not fit: their area is 0.916 of the box (the paper's: 0.918), that of a loose packing 0.84. The
 contact radius is the geometric one of the overlaps that this makes."""
 import pathlib
 import sys
