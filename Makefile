@@ -19,7 +19,7 @@ ROUNDS ?= 5#                       of make bench
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
 PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
-         check-cuda install clean help deps programs validate verify verify-full cost coupled-cost coupled-stability \
+         check-cuda install clean help deps programs validate validate-thermal verify verify-full cost coupled-cost coupled-stability \
          FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
@@ -175,8 +175,10 @@ demo: programs
 	$(RUN_ENV) DEMPM=$(abspath $(BUILD)/dempm) DEMPM_PACK=$(abspath $(BUILD)/dempm-pack) examples/column_collapse/run
 
 # Compares with LAMMPS and YADE too where they are installed.
-validate: programs $(TOOLS)
+validate: programs $(TOOLS) validate-thermal
 	$(foreach s,rve_stability rve_quasi_static rve_against_peers rve_conductivity,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
+validate-thermal: programs $(BUILD)/tests/test_grain_heat
+	$(foreach s,thermal_pairs thermal_liggghts thermal_box,$(RUN_ENV) $(PYTHON) tests/validation/$(s).py &&) true
 # The cases of TM-DEMPM; -full: the papers' sizes, hours to days. Finished runs are not repeated.
 verify: programs
 	$(RUN_ENV) $(PYTHON) tests/verify/verify.py $(CASES)
@@ -236,6 +238,7 @@ help:
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"
 	@echo "make validate     the figures of doc/validation.md; also against LAMMPS and YADE where they are installed"
+	@echo "make validate-thermal   the part of it about the heat of grains: build/validate/report.json; 4 minutes"
 	@echo "make verify       the cases of TM-DEMPM against their references, error beside seconds (verify-full: the papers' sizes; CASES=rod)"
 	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
 	@echo "make coupled-cost error against processor time of rod, heated_square and biaxial (doc/verification.md), 12 minutes; CASES=rod"

@@ -9,6 +9,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent / "bad_input"))
 from bond_cases import BOND_BASE, BOND_CASES  # noqa: E402
 from cases import BASE, CASES, FILES  # noqa: E402
 from heat_cases import HEAT_BASE, HEAT_CASES  # noqa: E402
+from rest_cases import REST_CASES  # noqa: E402
+
+ALL = CASES + HEAT_CASES + BOND_CASES + REST_CASES
 
 TIMEOUT = 20  # s; a wrong script ends in well under one
 
@@ -21,14 +24,14 @@ def test_script_without_mistake_runs(dempm, script, np):
 
 
 def test_there_are_at_least_60_distinct_wrong_scripts():
-    cases = CASES + HEAT_CASES + BOND_CASES
+    cases = ALL
     scripts = {case.script() for case in cases}
     assert len(scripts) == len(cases) == len({case.name for case in cases}) >= 60
     assert not scripts & {BASE, HEAT_BASE, BOND_BASE}
 
 
 @pytest.mark.parametrize("np", [1, 2])
-@pytest.mark.parametrize("case", CASES + HEAT_CASES + BOND_CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
 def test_refused(dempm, case, np):
     run = dempm(case.script(), np=np, files=FILES, timeout=TIMEOUT, check=False)
     assert run.code > 0, f"exit code {run.code}\n{run.output[-2000:]}"

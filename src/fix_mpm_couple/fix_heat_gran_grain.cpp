@@ -245,15 +245,21 @@ void FixHeatGranGrain::post_integrate() {
   if (2.0 * all > neighbor->skin - reach_) next_reneighbor = update->ntimestep;
 }
 
-/* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
-void FixHeatGranGrain::exchange(int i, int j, double *record) {
+GrainPair FixHeatGranGrain::pair_of(int i, int j) const {
   double **x = atom->x;
   const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
   const int *type = atom->type;
   const double distance = sqrt(branch[0] * branch[0] + branch[1] * branch[1] + branch[2] * branch[2]);
-  const GrainPair pair = {{atom->radius[i], atom->radius[j]},
-                          {find_conductivity(type[i], Temp[i]), find_conductivity(type[j], Temp[j])},
-                          find_real_distance(distance, atom->radius[i] + atom->radius[j], type[i], type[j])};
+  return {{atom->radius[i], atom->radius[j]},
+          {find_conductivity(type[i], Temp[i]), find_conductivity(type[j], Temp[j])},
+          find_real_distance(distance, atom->radius[i] + atom->radius[j], type[i], type[j])};
+}
+
+/* Pairs that cross a boundary between ranks are seen by both: each takes its own grain's part, of the same bits. */
+void FixHeatGranGrain::exchange(int i, int j, double *record) {
+  double **x = atom->x;
+  const double branch[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+  const GrainPair pair = pair_of(i, j);
   const double conductance = record ? collide(i, j, pair, record) : grain_heat_conductance(&model_, &pair);
   const double flow = (Temp[j] - Temp[i]) * conductance + (neighbours_ ? radiate(i, j, pair) : 0.0);
   if (flow == 0.0) return;

@@ -53,6 +53,7 @@ class FixHeatGranGrain : public FixHeatGran {
   void start_slip(double *history) const;
 
  private:
+  friend class FixHeatRest; /* steps the same temperatures by the same conductances, while the grains are at rest */
   enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, DAMPING, FLOWS };
   enum Law { HOOKE_STIFFNESS, HERTZ, HERTZ_STIFFNESS }; /* normal models of the pair style */
 
@@ -105,6 +106,7 @@ class FixHeatGranGrain : public FixHeatGran {
   double radiate_to_wall(const WallContact &contact);
   void keep_positions();
   void check_radiation(const class KeywordParser &) const;
+  GrainPair pair_of(int i, int j) const;
   void exchange(int i, int j, double *record);
   void exchange_with_surroundings();
 };

@@ -163,6 +163,8 @@ double grain_convection(const GrainSurface *exchange, double radius, double temp
 /* Stefan-Boltzmann: sigma emissivity 4 pi R^2 (T_s^4 - T^4), absolute temperatures, W. Surroundings are black or
  * large. */
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature);
+/* The same heat over T_s - T: a conductance, W/K. */
+double grain_radiation_conductance(const GrainSurface *exchange, double radius, double temperature);
 
 /* Two grains that see each other through the Voronoi face between them, a circle of radius `face`; or a grain (0) and a
  * plane. Seen from either centre the face bounds a cap of the surface, without the contact. The smaller cap sees the

@@ -12,10 +12,17 @@ double grain_convection(const GrainSurface *exchange, double radius, double temp
   return exchange->coefficient * surface(radius) * (exchange->fluid_temperature - temperature);
 }
 
-/* sigma (T1^4 - T0^4) as a product: no digits are lost near equilibrium. */
-static double emit(double from, double to, double zero) {
+/* sigma (T1^4 - T0^4) / (T1 - T0): with the difference as a factor no digits are lost near equilibrium. */
+static double find_emission(double from, double to, double zero) {
   const double hot = from - zero, own = to - zero, sum = hot + own;
-  return STEFAN_BOLTZMANN * (from - to) * sum * (sum * sum - 2.0 * (hot * own));
+  return STEFAN_BOLTZMANN * sum * (sum * sum - 2.0 * (hot * own));
+}
+
+static double emit(double from, double to, double zero) { return (from - to) * find_emission(from, to, zero); }
+
+double grain_radiation_conductance(const GrainSurface *exchange, double radius, double temperature) {
+  return exchange->emissivity * surface(radius) *
+         find_emission(exchange->surroundings, temperature, exchange->absolute_zero);
 }
 
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature) {
