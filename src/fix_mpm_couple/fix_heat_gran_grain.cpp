@@ -207,6 +207,7 @@ double FixHeatGranGrain::find_wall_reach() const {
 void FixHeatGranGrain::find_walls() {
   walls_.take_over(this);
   walls_found_ = true;
+  if (friction_) walls_.check_springs(this, LAW_NAMES[law_]);
   if (walls_.empty()) return;
   if (model_.direct == GRAIN_DIRECT_NONE && !reaches())
     fix_failed(lmp, this,
@@ -354,5 +355,6 @@ void FixHeatGranGrain::pre_final_integrate() {
     heatFlux[i] += flow;
     flow_[WALLS].add(flow);
   }
+  if (friction_) rub_walls();
   if (convection_ || radiation_) exchange_with_surroundings();
 }

@@ -56,6 +56,7 @@ class FixHeatGranGrain : public FixHeatGran {
   friend class FixHeatRest; /* steps the same temperatures by the same conductances, while the grains are at rest */
   enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, DAMPING, FLOWS };
   enum Law { HOOKE_STIFFNESS, HERTZ, HERTZ_STIFFNESS }; /* normal models of the pair style */
+  static const char *const LAW_NAMES[3];
 
   GrainHeat model_;
   GrainSurface surface_;
@@ -69,6 +70,7 @@ class FixHeatGranGrain : public FixHeatGran {
   std::vector<double> conductivity_; /* by atom type; [0] is unused */
   Law law_;                          /* with friction */
   std::vector<GrainContact> laws_;   /* by pair of types, with friction: factors of find_contact(); mass is unused */
+  std::vector<double> coulomb_;      /* coefficients of friction by pair of types; with friction */
   std::vector<double> capacity_;     /* J/(kg K), by atom type; with collisions */
   std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
   std::vector<double> overlap_ratio_; /* real by simulated overlap, by pair of types; with area_correction */
@@ -95,7 +97,9 @@ class FixHeatGranGrain : public FixHeatGran {
   void init_history();
   void init_friction();
   GrainContact read_law(int type, int other) const;
-  GrainContact find_contact(int i, int j, double overlap) const;
+  GrainContact find_contact(int type, int other, double mass, double radius, double overlap) const;
+  double find_coulomb_limit(int type, int other, const GrainContact &contact, double overlap, double parting) const;
+  void rub_walls();
   void init_collisions();
   double collide(int i, int j, const GrainPair &pair, double *record) const;
   void heat_by_friction();

@@ -58,10 +58,11 @@ void FixHeatGranGrain::init_history() {
   if (collides()) init_collisions();
 }
 
+const char *const FixHeatGranGrain::LAW_NAMES[3] = {"hooke/stiffness", "hertz", "hertz/stiffness"};
+
 void FixHeatGranGrain::init_friction() {
-  const char *const names[] = {"hooke/stiffness", "hertz", "hertz/stiffness"};
   int law = 0;
-  while (law < 3 && !pair_gran->contact_match("normal", names[law])) law++;
+  while (law < 3 && !pair_gran->contact_match("normal", LAW_NAMES[law])) law++;
   /* The spring comes first in the history if nothing else of the pair style is in it. */
   if (law == 3 || !pair_gran->contact_match("tangential", "history") || pair_gran->dnum_pair() != 3)
     fix_failed(lmp, this,
@@ -71,8 +72,13 @@ void FixHeatGranGrain::init_friction() {
   law_ = (Law)law;
   const size_t types = conductivity_.size();
   laws_.assign(types * types, GrainContact());
+  coulomb_.assign(types * types, 0.0);
   for (size_t a = 1; a < types; a++)
-    for (size_t b = 1; b < types; b++) laws_[a * types + b] = read_law(a, b);
+    for (size_t b = 1; b < types; b++) {
+      laws_[a * types + b] = read_law(a, b);
+      coulomb_[a * types + b] =
+          MaterialProperties(lmp, this, a).of_pair("coefficientFriction", NumberRange::at_least(0.0), b);
+    }
 }
 
 /* Of LIGGGHTS' normal models. `hertz`: stiffness 4/3 E* and 8 G*; damping as a share of critical damping. */
@@ -80,9 +86,9 @@ GrainContact FixHeatGranGrain::read_law(int a, int b) const {
   const MaterialProperties one(lmp, this, a), two(lmp, this, b);
   const NumberRange any = NumberRange::at_least(0.0), modulus = NumberRange::positive();
   if (law_ != HERTZ) {
-    GrainContact law = {{one.of_pair("kn", any, b), one.of_pair("kt", any, b)}, {}, 0.0};
-    if (damping_) law.damping[0] = one.of_pair("gamman", any, b), law.damping[1] = one.of_pair("gammat", any, b);
-    return law;
+    return {{one.of_pair("kn", any, b), one.of_pair("kt", any, b)},
+            {one.of_pair("gamman", any, b), one.of_pair("gammat", any, b)},
+            0.0};
   }
   double soft = 0.0, shear = 0.0;
   for (const MaterialProperties *grain : {&one, &two}) {
@@ -91,23 +97,65 @@ GrainContact FixHeatGranGrain::read_law(int a, int b) const {
     soft += (1.0 - nu * nu) / E, shear += 2.0 * (2.0 - nu) * (1.0 + nu) / E;
   }
   GrainContact law = {{4.0 / 3.0 / soft, 8.0 / shear}, {}, 0.0};
-  if (!damping_) return law;
   const double log_e = log(one.of_pair("coefficientRestitution", NumberRange::positive(), b));
   const double share = -2.0 * sqrt(5.0 / 6.0) * log_e / sqrt(log_e * log_e + M_PI * M_PI);
   law.damping[0] = share * sqrt(2.0 / soft), law.damping[1] = share * sqrt(8.0 / shear);
   return law;
 }
 
-GrainContact FixHeatGranGrain::find_contact(int i, int j, double overlap) const {
-  GrainContact contact = laws_[atom->type[i] * conductivity_.size() + atom->type[j]];
-  contact.mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
-  const double a = atom->radius[i], b = atom->radius[j];
-  const double radius = law_ == HOOKE_STIFFNESS ? 1.0 : sqrt(a * b / (a + b) * overlap); /* Hertz' contact radius */
+/* Effective mass and radius of the pair; at walls those of the particle. */
+GrainContact FixHeatGranGrain::find_contact(int type, int other, double mass, double radius, double overlap) const {
+  GrainContact contact = laws_[type * conductivity_.size() + other];
+  contact.mass = mass;
+  const double width = law_ == HOOKE_STIFFNESS ? 1.0 : sqrt(radius * fmax(overlap, 0.0)); /* Hertz' contact radius */
   for (int k = 0; k < 2; k++) {
-    contact.stiffness[k] *= radius;
-    contact.damping[k] *= law_ == HERTZ ? sqrt(radius * contact.mass) : radius * contact.mass;
+    contact.stiffness[k] *= width;
+    contact.damping[k] *= law_ == HERTZ ? sqrt(width * mass) : width * mass;
   }
   return contact;
+}
+
+double FixHeatGranGrain::find_coulomb_limit(int type, int other, const GrainContact &contact, double overlap,
+                                            double parting) const {
+  if (overlap <= 0.0) return 0.0;
+  const double normal = contact.stiffness[0] * overlap - contact.damping[0] * parting;
+  return coulomb_[type * conductivity_.size() + other] * fabs(normal);
+}
+
+/* LIGGGHTS keeps no values for this fix with contacts at walls: the spring of the step before is worked out again. Half
+ * of the work heats the particle; the other half is the wall's. */
+void FixHeatGranGrain::rub_walls() {
+  for (const WallTouch &touch : walls_.find_touches()) {
+    const int i = touch.grain, type = atom->type[i];
+    if (!(atom->mask[i] & groupbit)) continue;
+    const double radius = atom->radius[i], mass = atom->rmass[i], dt = update->dt;
+    GrainMotion motion = {{radius, 0.0}, {}, {}, {}};
+    double square = 0.0, parting = 0.0, push = 0.0, stretch = 0.0;
+    for (int a = 0; a < 3; a++) {
+      push -= atom->f[i][a] * touch.delta[a], stretch += touch.spring[a] * touch.spring[a];
+      motion.branch[a] = -touch.delta[a];
+      motion.velocity[0][a] = atom->v[i][a], motion.velocity[1][a] = touch.velocity[a];
+      motion.spin[0][a] = atom->omega[i][a];
+      square += touch.delta[a] * touch.delta[a];
+      parting -= (atom->v[i][a] - touch.velocity[a]) * touch.delta[a];
+    }
+    const double distance = sqrt(square), overlap = radius - distance;
+    parting /= distance, push /= distance;
+    const double change = push / mass * dt; /* of the speed, in this step and nearly so in the last one */
+    const GrainContact now = find_contact(type, touch.type, mass, radius, overlap);
+    const GrainContact then = find_contact(type, touch.type, mass, radius, overlap + parting * dt);
+    const double limit[2] = {find_coulomb_limit(type, touch.type, then, overlap + parting * dt, parting - change),
+                             find_coulomb_limit(type, touch.type, now, overlap, parting)};
+    const double stiffness[2] = {then.stiffness[1], now.stiffness[1]};
+    double before[3];
+    grain_spring_before(&motion, stiffness, limit, dt, touch.spring, before);
+    double slip = grain_slip_work(&motion, stiffness, dt, before, touch.spring);
+    /* The force is complete: the grain's next place is known, and whether the contact opens with a stretched spring. */
+    if (overlap <= (parting + change) * dt) slip += 0.5 * stiffness[1] * stretch;
+    const double damp = damping_ ? grain_damping_work(&motion, &now, dt, before, touch.spring) : 0.0;
+    heatFlux[i] += 0.5 * (slip + damp) / dt;
+    flow_[FRICTION].add(0.5 * slip / dt), flow_[DAMPING].add(0.5 * damp / dt);
+  }
 }
 
 /* Half of the work to each grain. Contacts are in the lists of two ranks if the grains are: each heats its own. The
@@ -126,7 +174,9 @@ void FixHeatGranGrain::slip(int i, int j, double *history) {
   const double reach = motion.radius[0] + motion.radius[1];
   double stiffness = 0.0;
   if (square < reach * reach) {
-    const GrainContact contact = find_contact(i, j, reach - sqrt(square));
+    const double mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
+    const GrainContact contact = find_contact(atom->type[i], atom->type[j], mass,
+                                              motion.radius[0] * motion.radius[1] / reach, reach - sqrt(square));
     stiffness = contact.stiffness[1];
     const double both[2] = {before[3] > 0.0 ? before[3] : stiffness, stiffness}; /* 0: a new contact, or a spring that was set */
     work[0] = grain_slip_work(&motion, both, update->dt, before, history);

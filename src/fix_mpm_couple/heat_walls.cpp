@@ -108,11 +108,11 @@ void HeatWalls::find_walls_in_sight() {
 }
 
 /* A particle near an edge lies on several triangles. The history of its contacts, in the walls' post_force(), holds
- * those of them that exert a force. */
-static bool is_partner(FixContactHistoryMesh *history, int i, int triangle) {
+ * those of them that exert a force; their number in it, or -1. */
+int HeatWalls::find_partner(FixContactHistoryMesh *history, int i, int triangle) {
   for (int k = 0; k < history->nneighs(i); k++)
-    if (history->get_partner_idTri(i, k) == triangle) return true;
-  return false;
+    if (history->get_partner_idTri(i, k) == triangle) return k;
+  return -1;
 }
 
 void HeatWalls::touch_mesh(FixMeshSurface *fix_mesh, double reach) {
@@ -128,7 +128,7 @@ void HeatWalls::touch_mesh(FixMeshSurface *fix_mesh, double reach) {
       const double radius = atom->radius[i];
       const double gap = mesh->resolveTriSphereContactBary(i, t, radius, atom->x[i], contact.delta, corner, sides);
       contact.distance = radius + gap;
-      contact.touches = gap < 0.0 && is_partner(fix_mesh->contactHistory(), i, mesh->id(t));
+      contact.touches = gap < 0.0 && find_partner(fix_mesh->contactHistory(), i, mesh->id(t)) >= 0;
       if (contact.touches || gap < reach * radius) contacts_.push_back(contact);
     }
 }

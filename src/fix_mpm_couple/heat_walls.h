@@ -11,6 +11,7 @@
 namespace LAMMPS_NS {
 
 class Fix;
+class FixContactHistoryMesh;
 class FixMeshSurface;
 class FixWallGran;
 
@@ -22,6 +23,14 @@ struct WallContact {
   bool touches;    /* overlaps, and on a mesh exerts a force there: the direct model conducts */
   bool in_sight;   /* the indirect model conducts: no nearer wall in about the same direction */
   double delta[3]; /* from the particle's centre to the nearest point of the wall, m */
+};
+
+/* A contact with any wall, also without a temperature. */
+struct WallTouch {
+  int grain, type;      /* as above */
+  double delta[3];      /* from the particle's centre to the point of contact, m */
+  double velocity[3];   /* of the wall there, m/s */
+  const double *spring; /* LIGGGHTS' tangential spring after the step, m */
 };
 
 class HeatWalls : protected Pointers {
@@ -36,14 +45,23 @@ class HeatWalls : protected Pointers {
   /* All contacts, and what is apart by less than `reach` radii of the particle. After the walls' post_force() of the
    * step: meshes know only then at which triangles a particle counts. */
   const std::vector<WallContact> &find_contacts(double reach);
+  /* Ends the program, in the name of `fix`, if a wall has another normal model than `normal`, another tangential model
+   * than `history`, or a model with more history. */
+  void check_springs(const Fix *fix, const char *normal);
+  /* Of all walls; only after check_springs(). As find_contacts(), after the walls' post_force(). */
+  const std::vector<WallTouch> &find_touches();
 
  private:
   std::vector<FixWallGran *> walls_;
   std::vector<WallContact> contacts_;
+  std::vector<WallTouch> touches_;
 
   void touch_primitive(FixWallGran *wall, double reach);
   void touch_mesh(FixMeshSurface *mesh, double reach);
   void find_walls_in_sight();
+  static int find_partner(FixContactHistoryMesh *history, int i, int triangle);
+  void rub_primitive(FixWallGran *wall);
+  void rub_mesh(FixMeshSurface *mesh);
 };
 
 }  // namespace LAMMPS_NS

@@ -149,6 +149,11 @@ double grain_slip_work(const GrainMotion *motion, const double stiffness[2], dou
  * tangential dashpot rests while the contact slips. */
 double grain_damping_work(const GrainMotion *motion, const GrainContact *contact, double step, const double before[3],
                           const double after[3]);
+/* What `before` was, m, where it is not kept (at walls): from the state `after` of the step, the Coulomb limits and
+ * tangential stiffnesses ([0] before, [1] after; N, N/m). Exact but for the turn of the plane of contact while the
+ * contact sticks or slips; in the step in which it begins to slip the limit takes the place of the spring's force. */
+void grain_spring_before(const GrainMotion *motion, const double stiffness[2], const double limit[2], double step,
+                         const double after[3], double before[3]);
 
 /* ------------------------------------------------------------------------------------------------- surface */
 /* What a grain exchanges with its surroundings over its whole surface, 4 pi R^2. Temperatures on the scale of the

@@ -64,3 +64,20 @@ double grain_damping_work(const GrainMotion *motion, const GrainContact *contact
   }
   return power * step;
 }
+
+void grain_spring_before(const GrainMotion *motion, const double stiffness[2], const double limit[2], double step,
+                         const double after[3], double before[3]) {
+  const double distance = sqrt(dot(motion->branch, motion->branch)), length = sqrt(dot(after, after));
+  double normal[3], slide[3];
+  for (int a = 0; a < 3; a++) normal[a] = motion->branch[a] / distance;
+  find_tangential_velocity(motion, normal, distance, slide);
+  double stretch = 1.0; /* of the trial state, which is parallel to `after` */
+  if (length > 0.0 && stiffness[1] * length >= limit[1] * (1.0 - 1e-9)) {
+    /* |trial - slide step| is the length that the limit allowed before */
+    const double allowed = stiffness[0] > 0.0 ? limit[0] / stiffness[0] : 0.0;
+    const double along = dot(after, slide) * step / length;
+    const double square = allowed * allowed - dot(slide, slide) * step * step + along * along;
+    stretch = fmax((along + sqrt(fmax(square, 0.0))) / length, 1.0);
+  }
+  for (int a = 0; a < 3; a++) before[a] = stretch * after[a] - slide[a] * step;
+}

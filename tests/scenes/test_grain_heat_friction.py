@@ -5,6 +5,7 @@ import random
 
 import pytest
 from test_grain_heat import HEAD, PROPERTIES, box, grains, last, packing
+from test_surface_walls import quad, stl
 
 SPRINGS = """
 neighbor 0.001 bin
@@ -150,6 +151,78 @@ def test_energy_of_many_colliding_grains_closes(damped, np, within, dempm):
     assert heat == pytest.approx(mechanical[0] - mechanical[1], rel=within)
 
 
+# ------------------------------------------------------------------------------------------------------- walls
+PLATE = {"plate.stl": stl(*quad((-0.01, -0.01, 0), (0.05, -0.01, 0), (0.05, 0.05, 0), (-0.01, 0.05, 0)))}
+FLOORS = {
+    "plane": "fix floor all wall/gran model {model} tangential history primitive type 2 zplane 0.0\n",
+    "mesh": "fix plate all mesh/surface file plate.stl type 2\n"
+            "fix floor all wall/gran model {model} tangential history mesh n_meshes 1 meshes plate\n",
+}
+
+
+def thrown(name, damped, floor, dt, duration=0.008):
+    """A grain is thrown at a floor; another one flies where nothing is."""
+    rows = [(1, 0.005, 0.0150, 0.018, 0.0052, 300.0), (2, 0.004, 0.0342, 0.03, 0.03, 300.0)]
+    make, heat = grains(rows)
+    push = "velocity all set 0 0 0\ngroup one id 1\nvelocity one set 0.4 0.3 -0.4\nset atom 1 omegax 30 omegay -20\n"
+    steps = round(duration / dt)
+    return (box((0, 0, -0.001), (0.04, 0.04, 0.04), "f f f") + make + model_of(name, damped).format(dt=dt) +
+            FLOORS[floor].format(model=name) + push + heat +
+            MOVING.replace("f_heat[4] ke", "f_heat[4] f_heat[5] ke").format(every=steps) + f"run {steps}\n")
+
+
+@pytest.mark.parametrize("floor", ["plane", "mesh"])
+@pytest.mark.parametrize("name, damped", [("hooke/stiffness", False), ("hooke/stiffness", True), ("hertz", False),
+                                          ("hertz", True), ("hertz/stiffness", True)])
+def test_half_of_the_energy_lost_at_a_wall_heats_the_grain(name, damped, floor, dempm, tmp_path):
+    errors = []
+    for dt in (4e-6, 2e-6):
+        run = dempm(thrown(name, damped, floor, dt), files=PLATE, cwd=tmp_path / str(dt))
+        (_, first), (_, end) = run.dump("end.dump")
+        lost = kinetic(first) - kinetic(end)
+        gained = 0.1 * end["mass"][0] * (end["f_Temp[0]"][0] - 300.0)
+        flows = [dt * math.fsum(run.table[f"f_heat[{k}]"]) for k in (4, 5)]
+        assert lost > (0.1 if damped else 0.01) * kinetic(first) and end["vz"][0] > 0.0
+        assert flows[0] + flows[1] == pytest.approx(gained, rel=1e-7) and (flows[1] > 0.0) == damped
+        assert end["f_Temp[0]"][1] == 300.0
+        errors.append(abs(2 * gained / lost - 1))
+    print("energy closure at a wall", name, damped, floor, errors)
+    assert errors[1] < 1e-3 and errors[1] < errors[0]
+
+
+def sliding_on(floor, speed, steps=10000):
+    """A grain at rest on a floor, by its weight, is set in motion."""
+    overlap = 2500 * 4 / 3 * math.pi * 0.005 ** 3 * 9.81 / 3000
+    make, heat = grains([(1, 0.005, 0.02, 0.02, 0.005 - overlap, 300.0), (2, 0.004, 0.0342, 0.03, 0.03, 300.0)])
+    springs = model_of("hooke/stiffness", True).format(dt=2e-6)
+    push = ("fix g all gravity 9.81 vector 0 0 -1\nvelocity all set 0 0 0\ngroup one id 1\n"
+            f"velocity one set {speed} 0 0\n")
+    output = MOVING.replace("thermo 1\n", "thermo 1000\n").format(every=steps)
+    return (box((0, 0, -0.001), (0.04, 0.04, 0.04), "f f f") + make + springs + floor + push + heat + output +
+            f"run {steps}\n")
+
+
+def test_sliding_on_floors_and_belts(dempm, tmp_path):
+    """What counts is the speed relative to the wall."""
+    plane, mesh = (FLOORS[name].format(model="hooke/stiffness") for name in ("plane", "mesh"))
+    move = "fix move_plate all move/mesh mesh plate linear -0.4 0 0\n"
+    small = quad((0.013, 0.01, 0), (0.035, 0.01, 0), (0.035, 0.03, 0), (0.013, 0.03, 0))  # stays in the box
+    belt = plane.replace("\n", " shear x -0.4\n")
+    scripts = {"plane": (plane, 0.4), "belt": (belt, 0.0), "moving": (mesh + move, 0.0)}
+    gains = {}
+    for name, (floor, speed) in scripts.items():
+        run = dempm(sliding_on(floor, speed), files={"plate.stl": stl(*small)}, cwd=tmp_path / name)
+        (_, first), (_, end) = run.dump("end.dump")
+        gains[name] = 0.1 * end["mass"][0] * (end["f_Temp[0]"][0] - 300.0)
+        if name == "plane":
+            lost = kinetic({key: value[:1] for key, value in first.items()})
+            lost -= kinetic({key: value[:1] for key, value in end.items()})
+    print("energy closure, sliding", 2 * gains["plane"] / lost - 1, gains)
+    assert 2 * gains["plane"] == pytest.approx(lost, rel=1e-3)
+    assert gains["belt"] == pytest.approx(gains["plane"], rel=1e-6)
+    assert gains["moving"] == pytest.approx(gains["plane"], rel=1e-3)
+
+
 # -------------------------------------------------------------------------------------------------- collisions
 def bounce(dt, duration=6e-3):
     """Two grains of different size and type hit each other head on; LIGGGHTS' Hertz without damping, E = 5e6."""
@@ -157,8 +230,8 @@ def bounce(dt, duration=6e-3):
     make, heat = grains(rows)
     steps = round(duration / dt)
     return (box((0, 0, 0), (0.04, 0.02, 0.02), "f f f") + make +
-            PROPERTIES.format(skin=0.001).replace("2e-5", repr(dt)).replace("0.5 0.5 0.5 0.5", " ".join(["0.999999"] * 4))
-            .replace("0.1 0.2", "100 200") +
+            PROPERTIES.format(skin=0.001).replace("2e-5", repr(dt))
+            .replace("0.5 0.5 0.5 0.5", "0.999999 0.999999 0.999999 0.999999").replace("0.1 0.2", "100 200") +
             "fix heat all heat/gran/grain initial_temperature 300 direct collisional\nfix move all nve/sphere\n"
             "velocity all set 0 0 0\ngroup one id 1\nvelocity one set 0.2 0 0\n" + heat +
             MOVING.replace("f_heat[4] ", "").format(every=steps) + f"run {steps}\n")

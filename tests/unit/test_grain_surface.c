@@ -39,6 +39,26 @@ static void slip_work_is_force_times_slip(void **state) {
   assert_true(fabs(grain_slip_work(&still, (double[]){k, 0.25 * k}, dt, before, before) - 0.375 * k * 9e-12) < 1e-20);
 }
 
+/* Sticking, and slipping in both steps: the spring of the step before is found again. */
+static void springs_of_the_step_before_are_found(void **state) {
+  (void)state;
+  const double dt = 1e-5, k[2] = {900, 1000}, before[3] = {3e-6, 4e-6, 0};
+  const GrainMotion motion = {
+      .radius = {0.5, 0}, .branch = {0, 0, 0.499}, .velocity = {{0.4, 0.1, 7}, {0, 0, 0}}, .spin = {{0.2, 0.3, 1}}};
+  /* Velocity at the point of contact, an arm of 0.4995 below the centre: (0.4 - 0.3 arm, 0.1 + 0.2 arm). */
+  const double slide[2] = {0.4 - 0.3 * 0.4995, 0.1 + 0.2 * 0.4995};
+  const double trial[3] = {before[0] + slide[0] * dt, before[1] + slide[1] * dt, 0.0};
+  for (int slips = 0; slips < 2; slips++) {
+    const double shortened = slips ? 0.7 : 1.0, length = shortened * hypot(trial[0], trial[1]);
+    const double after[3] = {shortened * trial[0], shortened * trial[1], 0.0};
+    const double limit[2] = {k[0] * 5e-6, slips ? k[1] * length : 1.0};
+    double found[3], worst = 0.0;
+    grain_spring_before(&motion, k, limit, dt, after, found);
+    for (int a = 0; a < 2; a++) note(&worst, found[a], before[a]);
+    AT_MOST(worst, 1e-12);
+  }
+}
+
 /* Dashpots: power = c v (v + acceleration dt / 2). Parting at 3 m/s, sliding at 1 m/s. */
 static void dashpots_work_at_the_mean_velocity(void **state) {
   (void)state;
@@ -161,6 +181,7 @@ static void wrong_tables_are_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(slip_work_is_force_times_slip),
+      cmocka_unit_test(springs_of_the_step_before_are_found),
       cmocka_unit_test(dashpots_work_at_the_mean_velocity),
       cmocka_unit_test(surfaces_exchange_heat_by_newton_and_stefan_boltzmann),
       cmocka_unit_test(neighbours_radiate_through_their_face),
