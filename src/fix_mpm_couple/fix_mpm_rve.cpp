@@ -50,10 +50,10 @@ FixMPMRve::~FixMPMRve() {
 }
 
 void FixMPMRve::read_keywords(int narg, char **arg) {
-  std::vector<std::string> keywords =
-                       {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
-                        "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "precision", "share", "rest", "backend", "threads",
-                        "replay", "conductivity"};
+  std::vector<std::string> keywords = {"packing", "model", "tangential", "density", "grain", "thickness", "damping",
+                                       "pipe_resistance", "reference", "bonds", "substeps", "timestep/dem", "skin",
+                                       "rotation", "precision", "share", "rest", "backend", "threads", "replay",
+                                       "conductivity"};
   keywords.insert(keywords.end(), CONDUCTION_KEYWORDS.begin(), CONDUCTION_KEYWORDS.end());
   KeywordParser parser(lmp, this, narg, arg, 3, keywords);
   while (parser.next()) {
@@ -118,7 +118,8 @@ void FixMPMRve::read_conductivity(KeywordParser &parser) {
   scene_.network = parser.choice({"affine", "network"});
   while (parser.has_value()) {
     if (parser.accept("every")) scene_.conductivity_every = parser.integer(1, 1000000000);
-    else if (scene_.network && parser.accept("change")) scene_.network_change = parser.number(NumberRange::between(0.0, 0.1));
+    else if (scene_.network && parser.accept("change"))
+      scene_.network_change = parser.number(NumberRange::between(0.0, 0.1));
     else parser.refuse(parser.word(""), scene_.network ? "every N or change E" : "every N");
   }
 }
