@@ -51,8 +51,7 @@ FixBondGranThermal::FixBondGranThermal(LAMMPS *lammps, int narg, char **arg)
   while (parser.next()) {
     if (parser.is("strength")) law_.strength = parser.number(NumberRange::positive());
     else if (parser.is("shear_ratio")) law_.shear_ratio = parser.number(NumberRange::positive());
-    else if (parser.is("melting"))
-      law_.melting = parser.accept("none") ? HUGE_VAL : parser.number(NumberRange::any());
+    else if (parser.is("melting")) law_.melting = parser.accept("none") ? HUGE_VAL : parser.number(NumberRange::any());
     else if (parser.is("reference")) law_.reference = parser.number(NumberRange::any());
     else if (parser.is("gap")) gap_ = parser.number(NumberRange::at_least(0.0));
   }
@@ -100,8 +99,9 @@ void FixBondGranThermal::init() {
   heat_ = NULL;
   for (int k = 0; k < modify->nfix; k++) {
     if (modify->fix[k] != this && strcmp(modify->fix[k]->style, style) == 0)
-      fix_failed(lmp, this, std::string("there is another one (id ") + modify->fix[k]->id +
-                                "); different strengths are not provided for");
+      fix_failed(lmp, this,
+                 std::string("there is another one (id ") + modify->fix[k]->id +
+                     "); different strengths are not provided for");
     if (FixHeatGranGrain *heat = dynamic_cast<FixHeatGranGrain *>(modify->fix[k])) heat_ = heat;
   }
   read_springs();
@@ -135,8 +135,8 @@ void FixBondGranThermal::read_springs() {
 void FixBondGranThermal::find_temperature() {
   temperature_ = NULL;
   if (std::isinf(law_.melting)) return;
-  temperature_ = static_cast<FixPropertyAtom *>(
-      modify->find_fix_property("Temp", "property/atom", "scalar", 0, 0, style, false));
+  temperature_ =
+      static_cast<FixPropertyAtom *>(modify->find_fix_property("Temp", "property/atom", "scalar", 0, 0, style, false));
   if (!temperature_ || temperature_->comm_forward == 0)
     fix_failed(lmp, this,
                "bonds melt, but grains (and their copies on other ranks) have no temperature: a fix heat/gran/... is "
@@ -147,8 +147,8 @@ void FixBondGranThermal::setup_pre_force(int vflag) { pre_force(vflag); }
 
 /* --------------------------------------------------------------------------------------------------------- a step */
 
-/* Springs and ends first, on all ranks, then forces: both grains of a bond must see it end in the same step. A setup takes
- * the forces of the step before again: nothing moves on and nothing ends. */
+/* Springs and ends first, on all ranks, then forces: both grains of a bond must see it end in the same step. A setup
+ * takes the forces of the step before again: nothing moves on and nothing ends. */
 void FixBondGranThermal::pre_force(int vflag) {
   const double step = update->setupflag ? 0.0 : update->dt;
   if (neighbor->ago == 0) {
@@ -215,7 +215,7 @@ void FixBondGranThermal::advance(int i, double step) {
   }
 }
 
-/* The contact goes on with the bond's tangential spring, as it was before the step, which the pair style is about to take. */
+/* The contact goes on with the bond's tangential spring of the step before: the pair style is about to take this one. */
 void FixBondGranThermal::end_bond(Bond &bond) {
   const bool handed = shared(bond) && bond.history;
   if (bond.history)
@@ -287,7 +287,7 @@ void FixBondGranThermal::find_images() {
   if (all > 0) forget_removed(missing);
 }
 
-/* Partners that this rank does not see: bonds with grains that are nowhere any more go with them. missing: of this rank. */
+/* `missing` partners are not seen by this rank. Bonds with grains that are nowhere any more go with them. */
 void FixBondGranThermal::forget_removed(int missing) {
   std::vector<int> mine, counts(comm->nprocs), starts(comm->nprocs + 1, 0);
   for (int i = 0; i < atom->nlocal; i++)
@@ -304,9 +304,12 @@ void FixBondGranThermal::forget_removed(int missing) {
   }
   MPI_Allreduce(&here, &there, 1, MPI_INT, MPI_MAX, world);
   if (there > 0)
-    fix_failed(lmp, this,
-               format_text("a bond of grain %d is longer than what ranks see of each other's grains, %g; a larger skin (command "
-                           "neighbor) widens that", there, comm->cutghost[0]));
+    fix_failed(
+        lmp, this,
+        format_text(
+            "a bond of grain %d is longer than what ranks see of each other's grains, %g; a larger skin (command "
+            "neighbor) widens that",
+            there, comm->cutghost[0]));
   for (int i = 0; i < atom->nlocal; i++)
     bonds_[i].erase(std::remove_if(bonds_[i].begin(), bonds_[i].end(), [](const Bond &bond) { return bond.other < 0; }),
                     bonds_[i].end());
@@ -335,8 +338,10 @@ void FixBondGranThermal::find_contacts() {
 void FixBondGranThermal::install() {
   install_pending_ = false;
   if (gap_ >= neighbor->skin)
-    fix_failed(lmp, this, format_text("keyword 'gap': %g is given, but the skin (command neighbor) is %g; allowed is a number "
-                                      "below that", gap_, neighbor->skin));
+    fix_failed(lmp, this,
+               format_text("keyword 'gap': %g is given, but the skin (command neighbor) is %g; allowed is a number "
+                           "below that",
+                           gap_, neighbor->skin));
   const NeighList *list = pair_->list;
   BaseStatus status = BASE_OK;
   for (int n = 0; n < list->inum; n++) {
@@ -348,14 +353,17 @@ void FixBondGranThermal::install() {
       const double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
       if (!(atom->mask[i] & atom->mask[j] & groupbit)) continue;
       if (gap_ > 0.0 ? square > reach * reach : square >= reach * reach) continue;
-      const double *history = pair_->is_history() ? list->listgranhistory->firstdouble[i] + (size_t)pair_->dnum() * k : NULL;
+      const double *history =
+          pair_->is_history() ? list->listgranhistory->firstdouble[i] + (size_t)pair_->dnum() * k : NULL;
       const int grain[2] = {i, j};
       for (int g = 0; g < 2 && grain[g] < atom->nlocal; g++) {
         Bond *bond = find_bond(grain[g], atom->tag[grain[1 - g]]);
         if (bond && bond->other != grain[1 - g])
-          status = base_error(BASE_ERROR_ARGUMENT,
-                              "grains %d and %d touch in two places, through the periodic boundary; a box of more than two "
-                              "grains' width is needed", atom->tag[i], atom->tag[j]);
+          status =
+              base_error(BASE_ERROR_ARGUMENT,
+                         "grains %d and %d touch in two places, through the periodic boundary; a box of more than two "
+                         "grains' width is needed",
+                         atom->tag[i], atom->tag[j]);
         if (bond) continue;
         bond = add_bond(grain[g], grain[1 - g]);
         for (int a = 0; a < 3 && history; a++) bond->bond.spring[a] = g == 0 ? history[a] : -history[a];
@@ -370,7 +378,7 @@ void FixBondGranThermal::install() {
 
 /* ------------------------------------------------------------------------------------------------------ partners */
 
-/* Round-off may let a bond begin or end as one of its grains sees it and not as the other does: what either sees holds. */
+/* Round-off may let a bond begin or end as one of its grains sees it and not as the other does: either is enough. */
 void FixBondGranThermal::tell_partners() {
   int most = 0, all;
   for (int i = 0; i < atom->nlocal; i++) {

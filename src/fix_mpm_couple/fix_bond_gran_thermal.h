@@ -22,10 +22,10 @@ namespace LAMMPS_NS {
  *   fix ID group bond/gran/thermal strength B shear_ratio M melting TS|none [reference T0] [gap G]
  *   fix_modify ID bonds install
  *
- * Both grains of a bond know it, each with the tangential spring as it sees it; each rank moves its own grains. The pair
- * style goes on to act between bonded grains that touch: its tangential spring is kept at zero, as it would slip, and this
- * fix adds its own. All that happens before the pair style, so that fixes which change forces (freeze, enforce2d) come later
- * wherever they stand in the script.
+ * Both grains of a bond know it, each with the tangential spring as it sees it; each rank moves its own grains. The
+ * pair style goes on to act between bonded grains that touch: its tangential spring is kept at zero, as it would slip,
+ * and this fix adds its own. All that happens before the pair style, so that fixes which change forces (freeze,
+ * enforce2d) come later wherever they stand in the script.
  *
  * Scalar: intact bonds over those made. Vector: see Count. Per grain: its intact bonds. */
 class FixBondGranThermal : public Fix {

@@ -55,8 +55,8 @@ void FixExpansionGran::init() {
   for (int k = 0; k < modify->nfix; k++)
     if (modify->fix[k] != this && modify->fix[k]->rad_mass_vary_flag)
       fix_failed(lmp, this, format_text("fix %s (id %s) sets radii too", modify->fix[k]->style, modify->fix[k]->id));
-  temperature_ = static_cast<FixPropertyAtom *>(
-      modify->find_fix_property("Temp", "property/atom", "scalar", 0, 0, style, false));
+  temperature_ =
+      static_cast<FixPropertyAtom *>(modify->find_fix_property("Temp", "property/atom", "scalar", 0, 0, style, false));
   if (!temperature_)
     fix_failed(lmp, this,
                "grains have no temperature: a fix heat/gran/... is needed, or 'fix ID all property/atom Temp scalar "
@@ -72,7 +72,8 @@ void FixExpansionGran::init() {
   MPI_Allreduce(largest.data(), limit_.data(), types + 1, MPI_DOUBLE, MPI_MAX, world);
 }
 
-/* LIGGGHTS sizes bins and the reach of ghosts by the largest radius at the start of a run, this rank's or any other's. */
+/* LIGGGHTS sizes bins and the reach of ghosts by the largest radius at the start of a run, this rank's or any other's.
+ */
 double FixExpansionGran::max_rad(int type) {
   double largest = 0.0;
   for (int i = 0; i < atom->nlocal; i++)
@@ -88,9 +89,9 @@ double FixExpansionGran::radius_of(int i) const {
   return kept_->array_atom[i][REFERENCE_RADIUS] * (1.0 + expansion_[atom->type[i]] * warmer);
 }
 
-/* A grain that has no reference radius yet is new: it has the radius that the script gave it. At the start of a run radii
- * follow temperatures that the script has set since the last; others stay, as the run before would have gone on with
- * them. */
+/* A grain that has no reference radius yet is new: it has the radius that the script gave it. At the start of a run
+ * radii follow temperatures that the script has set since the last; others stay, as the run before would have gone on
+ * with them. */
 void FixExpansionGran::expand(bool start) {
   BaseStatus status = BASE_OK;
   for (int i = 0; i < atom->nlocal; i++) {
@@ -103,10 +104,11 @@ void FixExpansionGran::expand(bool start) {
     const double radius = radius_of(i), limit = limit_[atom->type[i]];
     if (radius > 0.0 && radius <= limit) atom->radius[i] = radius;
     else
-      status = base_error(BASE_ERROR_ARGUMENT,
-                          "the radius of grain %d at temperature %g becomes %g, %g of that at the reference %g; allowed is "
-                          "a number > 0 and <= %g, as grains may grow by %g in a run: keyword 'growth', or several runs",
-                          atom->tag[i], temperature, radius, radius / kept[REFERENCE_RADIUS], reference_, limit, growth_);
+      status =
+          base_error(BASE_ERROR_ARGUMENT,
+                     "the radius of grain %d at temperature %g becomes %g, %g of that at the reference %g; allowed is "
+                     "a number > 0 and <= %g, as grains may grow by %g in a run: keyword 'growth', or several runs",
+                     atom->tag[i], temperature, radius, radius / kept[REFERENCE_RADIUS], reference_, limit, growth_);
   }
   fix_check(lmp, this, status);
 }

@@ -232,8 +232,8 @@ void FixHeatGranGrain::pre_force(int) {
   if (neighbor->ago == 0) keep_positions();
 }
 
-/* LIGGGHTS builds the list anew when a grain has moved (or grown) by half the skin, which is early enough for contacts. Pairs
- * with a gap up to the reach need it once a grain has moved by half of what the skin has beyond the reach. */
+/* LIGGGHTS builds the list anew when a grain has moved (or grown) by half the skin, which is early enough for contacts.
+ * Pairs with a gap up to the reach need it once a grain has moved by half of what the skin has beyond the reach. */
 void FixHeatGranGrain::post_integrate() {
   const size_t count = 4 * (size_t)atom->nlocal;
   double largest = built_.size() == count ? 0.0 : HUGE_VAL, all;

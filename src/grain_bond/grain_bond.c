@@ -51,7 +51,8 @@ void grain_bond_force(const GrainBondSprings *springs, const GrainBond *bond, co
   }
 }
 
-double grain_bond_energy(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state, int shared) {
+double grain_bond_energy(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state,
+                         int shared) {
   double square = state->approach * state->approach;
   if (shared) square = bond->gap * (bond->gap + 2.0 * state->overlap);
   return 0.5 * (springs->normal * square + springs->tangential * dot(state->spring, state->spring));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Bond between two grains whose strength falls with temperature: the law of the packings (src/cuda_rve, TM-DEMPM eq. 38-40
- * with the corrected eq. 40), for LIGGGHTS' own particles. SI units. */
+/* Bond between two grains whose strength falls with temperature: the law of the packings (src/cuda_rve, TM-DEMPM eq.
+ * 38-40 with the corrected eq. 40), for LIGGGHTS' own particles. SI units. */
 #ifndef DEMPM_GRAIN_BOND_H
 #define DEMPM_GRAIN_BOND_H
 
@@ -42,9 +42,9 @@ typedef struct GrainBondState {
 
 typedef enum GrainBondEnd {
   GRAIN_BOND_HOLDS,
-  GRAIN_BOND_PULLED, /* tension above F */
+  GRAIN_BOND_PULLED,  /* tension above F */
   GRAIN_BOND_SHEARED, /* shear above M F */
-  GRAIN_BOND_MELTED  /* any tension or shear, at or above the melting temperature */
+  GRAIN_BOND_MELTED   /* any tension or shear, at or above the melting temperature */
 } GrainBondEnd;
 
 /* B clip((T_s - T) / (T_s - T_ref), 0, 1). */
@@ -61,7 +61,8 @@ void grain_bond_force(const GrainBondSprings *springs, const GrainBond *bond, co
                       double force[3], double torque[3]);
 
 /* Elastic energy, J, beside that of the contact's normal spring if it is `shared`. */
-double grain_bond_energy(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state, int shared);
+double grain_bond_energy(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state,
+                         int shared);
 
 #ifdef __cplusplus
 }

@@ -129,8 +129,8 @@ double grain_heat_reach(const GrainHeat *model, double radius);
 typedef struct GrainMotion {
   double radius[2], branch[3], velocity[2][3], spin[2][3];
 } GrainMotion;
-/* Unit normal from grain 1 to grain 0, and the tangential velocity of the surface of grain 0 relative to that of grain 1 at
- * the point of contact, m/s. distance: |branch|, > 0. Returns the speed at which the centres move apart, m/s. */
+/* Unit normal from grain 1 to grain 0, and the tangential velocity of the surface of grain 0 relative to that of grain 1
+ * at the point of contact, m/s. distance: |branch|, > 0. Returns the speed at which the centres move apart, m/s. */
 double grain_tangential_velocity(const GrainMotion *motion, double distance, double normal[3], double velocity[3]);
 /* Springs (N/m) and dashpots (N s/m) of the contact at its overlap, normal and tangential, and the effective mass,
  * kg. */

@@ -147,11 +147,13 @@ def row(places, box, words, fixes, skin=1e-3, dimension=3, density=2500.0):
     """Grains of radius R at the given places."""
     words = {**PLAIN, **words}
     make = "".join(f"create_atoms 1 single {x!r} {y!r} {z!r} units box\n" for x, y, z in places)
-    return (HEAD.format(dimension=dimension, boundary="f f f" if dimension == 3 else "f f p") + f"region box block {box} units box\ncreate_box 1 box\n" +
-            make + f"set group all diameter {2 * R!r} density {density!r}\nneighbor {skin!r} bin\n" + LAW.format(**words) +
+    return (HEAD.format(dimension=dimension, boundary="f f f" if dimension == 3 else "f f p") +
+            f"region box block {box} units box\ncreate_box 1 box\n" + make +
+            f"set group all diameter {2 * R!r} density {density!r}\nneighbor {skin!r} bin\n" + LAW.format(**words) +
             fixes.format(**words))
 
 
+WITH_GAP = FIXES.replace("melting {melting}", "melting {melting} gap 1e-8")
 ROW_BOX = "-0.01 0.12 -0.01 0.01 -0.01 0.01"
 
 
@@ -188,12 +190,13 @@ def test_strength_falls_with_temperature(dempm, way, warmer, left, law):
     sheared by M times that force, less what the temperature takes."""
     velocity, ratio = PULL[way]
     words = dict(PLAIN, melting=400.0, expansion=0.0)
-    script = row([(0.0, 0.0, 0.0), (2 * R, 0.0, 0.0)], ROW_BOX, words, FIXES.replace("}\nfix_modify", "} gap 1e-8\nfix_modify"))
+    script = row([(0.0, 0.0, 0.0), (2 * R, 0.0, 0.0)], ROW_BOX, words, WITH_GAP)
     if law == "hertz":
         script = script.replace("hooke/stiffness", "hertz").replace("pair_style", HERTZ + "pair_style")
     stretch = words["strength"] * left * R * (ratio * words["kn"] / words["kt"] if way == "shear" else 1.0)
     steps = stretch / (0.1 * words["dt"])
-    script += f"group two id 2\nrun 0\nset atom 2 property/atom Temp {300 + 2 * warmer}\nfix go two move linear {velocity} units box\n"
+    script += f"group two id 2\nrun 0\nset atom 2 property/atom Temp {300 + 2 * warmer}\n"
+    script += f"fix go two move linear {velocity} units box\n"
     table = dempm(script + THERMO + "thermo 1\nrun 600\n").table
     ended = next(n for n, bonds in enumerate(table["f_bond[2]"]) if bonds == 0.0)
     assert abs(ended - steps) <= 1.0 + 1e-4 * steps
@@ -226,12 +229,12 @@ def test_grains_that_grow_into_each_other_are_found(dempm, np):
 
 
 def test_bond_that_ends_by_shear_leaves_a_contact_that_slips_and_heats(dempm):
-    """Two free grains, pressed together and sheared: the bond ends, its spring becomes that of the contact, which slides until they
-    part. Motion, heat of friction and the springs at the start add up."""
+    """Two free grains, pressed together and sheared: the bond ends, its spring becomes that of the contact, which slides
+    until they part. Motion, heat of friction and the springs at the start add up."""
     overlap, capacity = 5e-5, 500.0
-    script = row([(0.0, 0.0, 0.0), (2 * R - overlap, 0.0, 0.0)], ROW_BOX, dict(dt=1e-7, expansion=0.0, strength=2e-4, mu=0.3),
+    script = row([(0.0, 0.0, 0.0), (2 * R - overlap, 0.0, 0.0)], ROW_BOX, dict(dt=1e-7, expansion=0.0, strength=4e-3, mu=0.05),
                  FIXES.replace("direct pipe", "direct pipe friction yes"))
-    script += "group two id 2\nvelocity two set 0 0.2 0 units box\nfix move all nve/sphere\n"
+    script += "group two id 2\nvelocity two set 0 0.4 0 units box\nfix move all nve/sphere\n"
     script += THERMO.replace("ke", "ke f_heat f_heat[4]") + FRAME.replace("omegaz", "omegaz mass").replace("run 0", "").replace(
         '%.17g"', '%.17g %.17g"').replace("custom 1 ", "custom 10000 ") + "thermo 1\nrun 10000\n"
     run = dempm(script)
@@ -259,7 +262,7 @@ def test_bonded_hertz_contact_in_compression_is_that_of_the_pair_style(dempm):
 
 
 def test_bonds_go_with_a_grain_that_is_removed(dempm):
-    script = row([(2 * R * k, 0.0, 0.0) for k in range(4)], ROW_BOX, {}, FIXES.replace("{reference}\nfix_modify", "{reference} gap 1e-6\nfix_modify"))
+    script = row([(2 * R * k, 0.0, 0.0) for k in range(4)], ROW_BOX, {}, WITH_GAP)
     run = dempm(script + THERMO + "run 1\ngroup two id 2\ndelete_atoms group two compress no\nrun 1\n")
     assert [table["f_bond[2]"][-1] for table in run.thermo] == [3.0, 1.0]
 
@@ -267,7 +270,7 @@ def test_bonds_go_with_a_grain_that_is_removed(dempm):
 def test_bond_longer_than_ranks_see_is_an_error(dempm):
     """Pulled apart across the boundary between two ranks by more than any bond may reach."""
     script = row([(0.0, 0.0, 0.0), (2 * R, 0.0, 0.0)], "-0.05 0.06 -0.01 0.01 -0.01 0.01", dict(strength=100.0, expansion=0.0),
-                 FIXES.replace("{reference}\nfix_modify", "{reference} gap 1e-6\nfix_modify"), skin=1e-3)
+                 WITH_GAP, skin=1e-3)
     script += "group two id 2\nfix go two move linear 100 0 0 units box\n" + THERMO
     run = dempm(script + "run 100\n", np=2, check=False)
     assert run.code > 0 and "Fix bond/gran/thermal (id bond)" in run.output and "larger skin" in run.output

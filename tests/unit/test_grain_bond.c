@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The law of a bond: strength over temperature, ends, forces seen from both grains, force as the slope of the energy. */
+/* The law of a bond: strength over temperature, ends, forces seen from both grains, force as the slope of the energy.
+ */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -64,7 +65,8 @@ static void bonds_end_by_tension_shear_and_melting(void **state) {
     motion.branch[0] = 0.009 + cases[k].along;
     const GrainBond bond = {cases[k].gap, {0.0, cases[k].across, 0.0}};
     GrainBondState now;
-    assert_int_equal(grain_bond_advance(&law, &springs, &motion, &bond, cases[k].temperature, 1e-6, &now), cases[k].end);
+    assert_int_equal(grain_bond_advance(&law, &springs, &motion, &bond, cases[k].temperature, 1e-6, &now),
+                     cases[k].end);
   }
 }
 
@@ -99,7 +101,8 @@ static void force_is_the_slope_of_the_energy(void **state) {
       double energy[2], force[3], torque[3];
       for (int k = 0; k < 3; k++) {
         const double shift = k == 2 ? 0.0 : k == 0 ? h : -h;
-        GrainMotion motion = {{0.005, 0.004}, {(shared ? 0.00897 : 0.00903) + (across ? 0.0 : shift), 0.0, 0.0}, {{0}}, {{0}}};
+        GrainMotion motion = {
+            {0.005, 0.004}, {(shared ? 0.00897 : 0.00903) + (across ? 0.0 : shift), 0.0, 0.0}, {{0}}, {{0}}};
         const GrainBond bond = {2e-5, {0.0, 4e-6 + (across ? shift : 0.0), 0.0}};
         GrainBondState now;
         grain_bond_advance(&law, &elastic, &motion, &bond, 300.0, 0.0, &now);
