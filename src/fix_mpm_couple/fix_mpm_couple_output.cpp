@@ -135,8 +135,8 @@ std::string FixMPMCouple::rve_lines() const {
       id, (long long)law.rves, (long long)law.grains, steps, steps / seconds,
       100.0 * (law.seconds - rve_seconds_before_) / seconds);
   line += format_text("Fix %s: %lld RVE steps so far: %lld computed, %lld copies of one with the same packing and history, "
-                      "%lld not run as their points rest\n",
-                      id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared), (long long)law.shared,
-                      (long long)law.rested);
+                      "%lld in free flight, %lld not run as their points rest\n",
+                      id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared - law.flown),
+                      (long long)law.shared, (long long)law.flown, (long long)law.rested);
   return line;
 }

@@ -357,7 +357,10 @@ BaseStatus rve_store_view(const RveStore *store, int handle, RveView *view) {
 
 void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
   *totals = (RveStoreTotals){.particle_steps = store->particle_steps, .calls = store->calls, .seconds = store->seconds};
-  for (int b = 0; b < store->batches; b++) totals->shared += rve_batch_shared(store->batch[b]);
+  for (int b = 0; b < store->batches; b++) {
+    totals->shared += rve_batch_shared(store->batch[b]);
+    totals->flown += rve_batch_flown(store->batch[b]);
+  }
   for (int s = 0; s < store->slots; s++)
     if (store->slot[s].batch >= 0) totals->grains += store->slot[s].item.grains;
 }
