@@ -102,7 +102,7 @@ static void free_flights_equal_the_steps(void **state) {
   }
 }
 
-/* Two grains that fly at each other: the call in which they meet is stepped, those before it are not. */
+/* Two grains that fly at each other: the call in which they meet is stepped, and those that need a new list. */
 static void a_flight_ends_before_grains_meet(void **state) {
   (void)state;
   RvePacking packing = help_packing(2, 2);
@@ -121,7 +121,7 @@ static void a_flight_ends_before_grains_meet(void **state) {
     assert_true(fabs(answer[flight].kinetic_energy / answer[0].kinetic_energy - 1.0) <= 1e-9);
     const int64_t flown = rve_batch_flown(batch);
     printf("two grains that meet: %lld of 400 calls were flights\n", (long long)flown);
-    assert_true(flight ? flown > 350 && flown < 400 : flown == 0);
+    assert_true(flight ? flown > 300 && flown < 400 : flown == 0);
     rve_batch_destroy(batch);
   }
   rve_packing_destroy(&packing);
