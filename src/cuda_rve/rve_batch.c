@@ -301,7 +301,7 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
         continue;
       }
       record->last = job->answer;
-      batch->flown += input && job->answer.flew;
+      batch->flown += duration > 0.0 && job->answer.flew;
       rve_head(record->arena)->failed = record->last.status;
       rve_head(record->arena)->temperature = job->call.temperature;
       if (!record->last.status || !input) continue;
@@ -341,8 +341,7 @@ static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveI
     }
   }
   rve_twins_renew(batch, n);
-  batch->shared += copied;
-  batch->flown += flown;
+  if (duration > 0.0) batch->shared += copied, batch->flown += flown;
   return first;
 }
 
