@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* A call in which no two grains can meet, in closed form. Without forces the steps of rve_step.h are linear maps that commute, as all
- * are functions of L: with A = 1 - L dt and E = exp(L dt), n steps are
+/* A call in which no two grains can meet, in closed form. Without forces the steps of rve_step.h are linear maps that
+ * commute, as all are functions of L: with A = 1 - L dt and E = exp(L dt), n steps are
  *
  *   v <- A^n v,   H <- E^n H,   s <- s + H^-1 M v,   M = dt A sum_(j < n) (E^-1 A)^j,
  *
@@ -156,7 +156,8 @@ RVE_FN void rve_move_freely(RveFeatures ft, const RveTeam *team, const RveCall *
 RVE_PART int rve_fly(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, double scale, const RveCounts *n,
                      const RveArrays *a) {
   RveFlight flight;
-  if (!call->flight || call->steps < 2 || head->done > 0 || head->list_due != RVE_LIST_GOOD || !head->apart || !(scale > 0.0)) return 0;
+  if (!call->flight || call->steps < 2 || !(scale > 0.0)) return 0;
+  if (head->done > 0 || head->list_due != RVE_LIST_GOOD || !head->apart) return 0;
   rve_plan_flight(ft.dimension, call, head, scale, &flight);
   const double fastest = rve_fastest(ft.dimension, team, n, a);
   const RveHead after = rve_head_after(&flight, head, fastest);

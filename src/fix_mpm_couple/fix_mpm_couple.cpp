@@ -112,7 +112,8 @@ void FixMPMCouple::check_keywords(const KeywordParser &parser) {
   if (!scene_.mechanical && !scene_.thermal)
     parser.fail("keyword 'mechanics': 'no' without 'thermal yes' leaves nothing to do");
   if (parser.given("thermal/every") && !(scene_.thermal && scene_.mechanical))
-    parser.fail("keyword 'thermal/every' needs 'thermal yes' and 'mechanics yes'; with 'mechanics no' the time step is the thermal one");
+    parser.fail("keyword 'thermal/every' needs 'thermal yes' and 'mechanics yes'; with 'mechanics no' the time step is the "
+                "thermal one");
   if (given_density_ > 0.0 && rve_id_.empty())
     parser.fail("keyword 'density/bulk' needs 'material rve'; with 'material elastic': set group GROUP density RHO");
   if (!parser.given("threads")) {
@@ -434,8 +435,8 @@ void FixMPMCouple::check_time_step(bool starting) {
   const double step = worse ? every * update->dt : update->dt;
   if (step <= limit[worse]) return;
   const std::string times = worse && every > 1 ? format_text("%d times ('thermal/every') ", every) : "";
-  const std::string message = format_text("%stimestep %g s is larger than the critical %s time step %g s", times.c_str(), update->dt,
-                                          worse ? "thermal" : "mechanical", limit[worse]);
+  const std::string message = format_text("%stimestep %g s is larger than the critical %s time step %g s", times.c_str(),
+                                          update->dt, worse ? "thermal" : "mechanical", limit[worse]);
   if (starting) fix_failed(lmp, this, message + "; reduce 'timestep', or override by 'timestep/check no'");
   fix_warning(lmp, this, format_text("at step %lld ", (long long)update->ntimestep) + message);
   warned_time_step_ = true;

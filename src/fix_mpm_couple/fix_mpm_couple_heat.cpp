@@ -22,8 +22,9 @@ void FixMPMCouple::read_thermal_every(KeywordParser &parser) {
 /* Sources wait until the next thermal step: not for longer than this, however slow conduction is. */
 static const double MOST_STEPS = 1000.0;
 
-/* Time steps of the thermal step that begins now: as many as its critical length allows and as let no temperature change by more than
- * heat_error_ of the range of temperatures at the present rates; at most twice as many as last time, since rates change. Collective. */
+/* Time steps of the thermal step that begins now: as many as its critical length allows and as let no temperature change
+ * by more than heat_error_ of the range of temperatures at the present rates; at most twice as many as last time, since
+ * rates change. Collective. */
 int64_t FixMPMCouple::choose_heat_steps() const {
   if (heat_every_ > 0) return heat_every_;
   double mine[3] = {0.0, start_temperature_, -start_temperature_}, all[3]; /* fastest change, highest, minus the lowest */

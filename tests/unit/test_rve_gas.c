@@ -40,8 +40,8 @@ static void stretched_rve_is_a_stressless_gas_and_comes_back(void **state) {
   }
 }
 
-/* A cloud of slow grains, stretched, let go, sheared, heated: flights beside steps, to round-off; and the same bits again, also after a restart. Nothing meets,
- * as a collision would make differences of round-off grow. */
+/* A cloud of slow grains, stretched, let go, sheared, heated: flights beside steps, to round-off; and the same bits again,
+ * also after a restart. Nothing meets, as a collision would make differences of round-off grow. */
 static void free_flights_equal_the_steps(void **state) {
   (void)state;
   for (int dim = 2; dim <= 3; dim++) {
