@@ -52,7 +52,6 @@ static void free_flights_equal_the_steps(void **state) {
     double out[9] = {0.0}, shear[9] = {0.0}, worst = 0.0;
     uint64_t seed = 7;
     for (int k = 0; k < dim; k++) out[4 * k] = 10.0 + k;
-    MUST(BASE_ALLOC(3 * (size_t)packing.grains, &packing.velocity));
     for (int g = 0; g < packing.grains; g++) {
       packing.radius[g] *= 0.9;
       for (int k = 0; k < dim; k++) packing.velocity[3 * g + k] = 4e-3 * (base_random(&seed) - 0.5);
