@@ -68,6 +68,8 @@ typedef struct RveScene {
   double skin;                /* neighbour skin as a fraction of the largest radius; 0 = automatic */
   int share;                  /* 1: RVEs with the same packing and the same calls so far are computed once (default); the
                                  results are the same to the last bit; CPU only. 0: each by itself, e.g. to time them */
+  int flight;                 /* 1: calls in which no grains can meet are answered in closed form, equal to the steps but for
+                                 round-off (default); 0: they are stepped */
   int mixed;                  /* 1: contact forces in FP32, sums and positions as ever; needs AVX-512, else FP64 runs (see
                                  rve_batch_backend_name). Stresses differ by about 1e-5 of the mean stress. Default 0 */
   int threads;                /* OpenMP threads; 0 = OpenMP's own choice */
@@ -126,6 +128,7 @@ typedef struct RveAnswer {
   int64_t steps;          /* DEM steps since creation */
   int64_t rebuilds;       /* neighbour lists built since creation */
   int status;             /* 0, or BASE_ERROR_UNSTABLE: a value is not finite; the other entries are then the last good */
+  int flew;               /* 1: no two grains could meet in the last call, which was answered in closed form */
 } RveAnswer;
 
 typedef struct RveBatch RveBatch;
@@ -158,6 +161,8 @@ int64_t rve_batch_shared(const RveBatch *batch);
 
 /* Conductivities that were asked of networks since creation: by solving, and carried along from an earlier solution. */
 void rve_batch_network_counts(const RveBatch *batch, int64_t *solved, int64_t *kept);
+/* How many RVE steps were free flights, answered in closed form, since creation; copies are not counted. */
+int64_t rve_batch_flown(const RveBatch *batch);
 
 /* Bonds every contact with overlap > 0 of the given RVEs (NULL: all). Requires scene.bonds. */
 BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index);

@@ -323,6 +323,7 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
         continue;
       }
       record->last = job->answer;
+      batch->flown += duration > 0.0 && job->answer.flew;
       rve_head(record->arena)->failed = record->last.status;
       rve_head(record->arena)->temperature = job->call.temperature;
       TRY(device_conduction(batch, job->rve, input ? &job->input : &nothing, duration));
@@ -339,11 +340,11 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
 /* Steps the first of each set of twins, then copies it. A twin of one that failed fails by itself. */
 static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
   BaseStatus first = BASE_OK;
-  int64_t copied = 0;
+  int64_t copied = 0, flown = 0;
   rve_twins_sort(batch, n, index, input);
   for (int followers = 0; followers < 2; followers++) {
     const int good = first == BASE_OK;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch)) reduction(+ : copied)
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch)) reduction(+ : copied, flown)
     for (int k = 0; k < n; k++) {
       const RveTwin *twin = &batch->twin[k];
       const int follows = twin->leader != twin->rve;
@@ -354,6 +355,7 @@ static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveI
         copied++;
       } else {
         status = step_record(batch, twin->rve, twin->input, duration, &batch->workspace[omp_get_thread_num()]);
+        flown += batch->record[twin->rve].last.flew;
       }
       if (status != BASE_OK) {
 #pragma omp critical(rve_step)
@@ -362,7 +364,7 @@ static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveI
     }
   }
   rve_twins_renew(batch, n);
-  batch->shared += copied;
+  if (duration > 0.0) batch->shared += copied, batch->flown += flown;
   return first;
 }
 
@@ -375,6 +377,7 @@ void rve_batch_network_counts(const RveBatch *batch, int64_t *solved, int64_t *k
 }
 
 int64_t rve_batch_shared(const RveBatch *batch) { return batch->shared; }
+int64_t rve_batch_flown(const RveBatch *batch) { return batch->flown; }
 
 BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration,
                           RveAnswer *answer) {

@@ -45,6 +45,7 @@ struct RveBatch {
   uint64_t histories; /* numbers used */
   RveTwin *twin;      /* [count] of the present call */
   int64_t shared;     /* RVE steps copied since creation */
+  int64_t flown;      /* RVE steps that were free flights since then, copies excepted */
   int threads;
   RveWorkspace *workspace;
   RveDeviceJob *job; /* [count] on a device */

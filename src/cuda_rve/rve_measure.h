@@ -88,13 +88,18 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real 
     }
 }
 
-RVE_FN void rve_sum_grains(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *own, RveSums *sum) {
+/* flew: there are no forces. */
+RVE_FN void rve_sum_grains(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *own, int flew,
+                           RveSums *sum) {
   const int dim = ft.dimension;
   rve_real f[3], t[3], p[3];
   const rve_real m = rve_load(a->mass, lane0), im = rve_load(a->inverse_inertia, lane0), half = rve_set(0.5);
-  rve_sum_reactions(ft, n, a, lane0, f, t);
-  for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0), p[k] = rve_set(0.0) - m * own->v[k];
-  sum->of.resultant = sum->of.resultant + rve_sqrt(rve_dot(dim, f, f));
+  for (int k = 0; k < dim; k++) p[k] = rve_set(0.0) - m * own->v[k];
+  if (!flew) {
+    rve_sum_reactions(ft, n, a, lane0, f, t);
+    for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0);
+    sum->of.resultant = sum->of.resultant + rve_sqrt(rve_dot(dim, f, f));
+  }
   rve_add_dyad(dim, sum->of.stress, p, own->v);
   sum->of.kinetic = sum->of.kinetic - half * rve_dot(dim, p, own->v);
   const rve_mask turns = rve_less(rve_set(0.0), im);
@@ -169,11 +174,12 @@ RVE_FN void rve_fill_answer(RveFeatures ft, const RveCall *call, const RveHead *
   answer->elastic_energy = total->of.elastic;
   answer->damping_work = head->damping_work;
   answer->unbalanced = total->of.force > 0.0 ? total->of.resultant / n->grains / (total->of.force * per_contact) : 0.0;
-  answer->modulus = rve_largest_modulus(call, ft.dimension, total->of.fourth, volume);
+  answer->modulus = contacts > 0.0 ? rve_largest_modulus(call, ft.dimension, total->of.fourth, volume) : 0.0;
   answer->volume = volume;
   answer->steps = head->steps;
   answer->rebuilds = head->rebuilds;
   answer->status = BASE_OK;
+  answer->flew = head->flew;
 }
 
 RVE_FN int rve_answer_is_finite(const RveAnswer *x) {
@@ -187,6 +193,7 @@ RVE_FN int rve_answer_is_finite(const RveAnswer *x) {
 RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
                         const RveArrays *a, double work_before, double duration, RveAnswer *answer) {
   const RveFeatures all = {ft.dimension, ft.tangential, 1, ft.bonds}; /* velocities are needed below */
+  const int flew = head->flew;
   rve_real h[9];
   for (int k = 0; k < 9; k++) h[k] = rve_set(head->cell[k] * RVE_UNIT);
   RveSums sum;
@@ -194,9 +201,9 @@ RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call
   for (int span = team->pack; span < n->blocks * RVE_PARTS; span += team->packs) {
     const int block = span / RVE_PARTS, part = span % RVE_PARTS * RVE_SPAN;
     const RveBody own = rve_own_body(all, a, span * RVE_SPAN);
-    for (int row = a->slot_first[block]; row < a->slot_first[block + 1]; row++)
+    for (int row = a->slot_first[block]; row < a->slot_first[block + 1] && !flew; row++)
       rve_sum_contact(ft, call, h, n, a, &own, row * RVE_PACK + part, &sum);
-    rve_sum_grains(ft, n, a, span * RVE_SPAN, &own, &sum);
+    rve_sum_grains(ft, n, a, span * RVE_SPAN, &own, flew, &sum);
   }
   RveTotals total;
   for (int k = 0; k < RVE_SUMS; k++) total.all[k] = rve_team_sum(team, sum.all[k]);
@@ -206,6 +213,7 @@ RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call
     rve_fill_answer(ft, call, head, n, &total, work_before, duration, &fresh);
     if (rve_answer_is_finite(&fresh)) *answer = fresh;
     else head->failed = BASE_ERROR_UNSTABLE, answer->status = BASE_ERROR_UNSTABLE;
+    head->apart = total.of.contacts == 0.0 && total.of.force == 0.0 && total.of.elastic == 0.0;
   }
   rve_sync();
 }

@@ -49,7 +49,7 @@ BaseStatus rve_record_pack(const RveRecord *record, uint64_t scene_hash, void *b
   header.last = record->last;
   header.conduction = record->conduction;
   /* The gap behind the last field is no state: the bytes must not depend on what the stack held. */
-  const size_t end = offsetof(RveAnswer, status) + sizeof header.last.status;
+  const size_t end = offsetof(RveAnswer, flew) + sizeof header.last.flew;
   memset((char *)&header.last + end, 0, sizeof header.last - end);
   header.checksum = checksum_of(&header, record->arena);
   memcpy(bytes, &header, sizeof header);

@@ -24,6 +24,7 @@ RveScene rve_scene_default(void) {
   scene.bond_melting_temperature = INFINITY;
   scene.time_step_fraction = 0.5;
   scene.share = 1;
+  scene.flight = 1;
   return scene;
 }
 
@@ -98,6 +99,7 @@ static BaseStatus check_steps(const RveScene *scene) {
   if (!(scene->skin >= 0.0 && scene->skin <= 1.0)) return outside("skin", scene->skin, "0 <= skin <= 1");
   TRY(flag("mixed", scene->mixed));
   TRY(flag("share", scene->share));
+  TRY(flag("flight", scene->flight));
   if (scene->threads < 0) return outside("threads", scene->threads, ">= 0");
   return BASE_OK;
 }
@@ -148,6 +150,7 @@ static void call_material(const RveScene *scene, RveCall *call) {
   call->bond_melting_temperature = scene->bond_melting_temperature;
   call->skin_fraction = scene->skin;
   call->thickness = scene->dimension == 2 ? scene->thickness : 1.0;
+  call->flight = scene->flight;
 }
 
 /* exp(factor a) - 1. Small ones by their own series: adding the unit first would round away what thousands of steps add up. */

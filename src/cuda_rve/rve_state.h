@@ -53,7 +53,8 @@ typedef struct RveHead {
   int32_t failed;   /* BASE_ERROR_UNSTABLE after the watchdog spoke, for ever */
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
-  int32_t pad[2];
+  int32_t apart;    /* no grains touch, no bond holds and no force is left: the next call may be a free flight */
+  int32_t flew;     /* the last call was one */
 } RveHead;
 
 /* Arrays of an arena. N = blocks * lanes grains (the last ones are massless padding). [k] counts components. */
@@ -91,7 +92,7 @@ typedef struct RveCall {
   double normal_stiffness, tangential_stiffness, friction;
   double normal_viscosity, tangential_viscosity, critical_viscosity; /* per m_eff; per sqrt(m_eff) */
   double local_damping;
-  int32_t thermal, rotation;
+  int32_t thermal, rotation, flight;
   double expansion, reference_temperature, pipe_resistance;
   double bond_strength, bond_shear_ratio, bond_melting_temperature;
   double skin_fraction; /* of the largest radius; 0: found from the time that lists last */

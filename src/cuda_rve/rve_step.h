@@ -3,8 +3,7 @@
 #ifndef DEMPM_RVE_STEP_H
 #define DEMPM_RVE_STEP_H
 
-#include "rve_kernel.h"
-#include "rve_neighbour.h"
+#include "rve_flight.h"
 #include "rve_outcome.h"
 
 RVE_FN double rve_radius_factor(const RveCall *call, double temperature) {
@@ -86,7 +85,12 @@ RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *ca
   RveOutcome outcome = RVE_DONE;
   int resumed = head->list_due || call->steps == 0;
   rve_sync();
-  if (resumed && call->steps == 0) rve_refresh_rows(ft, team, n, a);
+  const int flew = rve_fly(ft, team, call, head, rve_radius_factor(call, call->temperature), n, a);
+  rve_sync();
+  if (team->leader) head->flew = flew;
+  if (flew || (resumed && call->steps == 0)) rve_refresh_rows(ft, team, n, a);
+  rve_sync();
+  if (flew) return RVE_DONE;
   for (int64_t step = done0; step < call->steps || resumed; step++) {
     double dt = call->dt;
     if (!resumed) {

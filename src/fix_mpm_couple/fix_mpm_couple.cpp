@@ -68,7 +68,8 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
   KeywordParser parser(
       lmp, this, narg, arg, 3,
       {"grid", "origin", "shape", "transfer", "order", "material", "thermal", "temperature", "mechanics",
-       "damping/point", "damping/grid", "point/size", "density/bulk", "timestep/check", "leaving", "threads", "follow"});
+       "damping/point", "damping/grid", "point/size", "density/bulk", "timestep/check", "leaving", "threads", "follow",
+       "thermal/every"});
   while (parser.next()) {
     if (parser.is("grid")) scene_.spacing = parser.number(NumberRange::positive());
     else if (parser.is("origin"))
@@ -81,6 +82,7 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
       scene_.order = (MpmOrder[]){MPM_ORDER_USF, MPM_ORDER_USL, MPM_ORDER_MUSL}[parser.choice({"usf", "usl", "musl"})];
     else if (parser.is("material")) read_material(parser);
     else if (parser.is("thermal")) scene_.thermal = parser.yes_no();
+    else if (parser.is("thermal/every")) read_thermal_every(parser);
     else if (parser.is("temperature")) start_temperature_ = parser.number(NumberRange::any());
     else if (parser.is("mechanics")) scene_.mechanical = parser.yes_no();
     else if (parser.is("damping/point")) scene_.point_damping = parser.number(NumberRange::at_least(0.0));
@@ -109,6 +111,9 @@ void FixMPMCouple::check_keywords(const KeywordParser &parser) {
     parser.require("temperature", "temperature T0, that of the points at the start, is needed with 'thermal yes'");
   if (!scene_.mechanical && !scene_.thermal)
     parser.fail("keyword 'mechanics': 'no' without 'thermal yes' leaves nothing to do");
+  if (parser.given("thermal/every") && !(scene_.thermal && scene_.mechanical))
+    parser.fail("keyword 'thermal/every' needs 'thermal yes' and 'mechanics yes'; with 'mechanics no' the time step is the "
+                "thermal one");
   if (given_density_ > 0.0 && rve_id_.empty())
     parser.fail("keyword 'density/bulk' needs 'material rve'; with 'material elastic': set group GROUP density RHO");
   if (!parser.given("threads")) {
@@ -413,17 +418,25 @@ void FixMPMCouple::setup(int) {
   start_progress();
 }
 
-void FixMPMCouple::check_time_step(bool starting) {
-  if (!check_time_step_ || (!starting && warned_time_step_)) return;
-  double mine[2], limit[2];
+/* Critical time steps, s, mechanical and thermal, of all points. Collective. */
+void FixMPMCouple::find_limits(double limit[2]) const {
+  double mine[2];
   mpm_critical_time_steps(mpm_, points_.data(), (int)points_.size(), &mine[0], &mine[1]);
   MPI_Allreduce(mine, limit, 2, MPI_DOUBLE, MPI_MIN, world);
   if (!scene_.mechanical) limit[0] = HUGE_VAL;
   if (!scene_.thermal) limit[1] = HUGE_VAL;
-  const int worse = limit[1] < limit[0];
-  if (update->dt <= limit[worse]) return;
-  const std::string message = format_text("timestep %g s is larger than the critical %s time step %g s", update->dt,
-                                          worse ? "thermal" : "mechanical", limit[worse]);
+}
+
+void FixMPMCouple::check_time_step(bool starting) {
+  if (!check_time_step_ || (!starting && warned_time_step_)) return;
+  double limit[2];
+  find_limits(limit);
+  const int every = heat_every_ > 1 ? heat_every_ : 1, worse = limit[1] / every < limit[0];
+  const double step = worse ? every * update->dt : update->dt;
+  if (step <= limit[worse]) return;
+  const std::string times = worse && every > 1 ? format_text("%d times ('thermal/every') ", every) : "";
+  const std::string message = format_text("%stimestep %g s is larger than the critical %s time step %g s", times.c_str(),
+                                          update->dt, worse ? "thermal" : "mechanical", limit[worse]);
   if (starting) fix_failed(lmp, this, message + "; reduce 'timestep', or override by 'timestep/check no'");
   fix_warning(lmp, this, format_text("at step %lld ", (long long)update->ntimestep) + message);
   warned_time_step_ = true;

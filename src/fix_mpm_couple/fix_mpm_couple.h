@@ -25,7 +25,7 @@ namespace LAMMPS_NS {
  *       material rve RVEFIXID | material elastic 3d|plane_strain|plane_stress|bar
  *       [origin x y z] [order usf|usl|musl] [thermal yes|no] [temperature T0] [mechanics yes|no]
  *       [damping/point A] [damping/grid A] [point/size LX LY [LZ]] [timestep/check yes|no]
- *       [leaving error|delete] [density/bulk RHO] [threads N]
+ *       [leaving error|delete] [density/bulk RHO] [threads N] [thermal/every N|auto E]
  *   fix_modify ID damping/point A
  *   fix_modify ID damping/grid A             (from the next run on)
  *
@@ -49,7 +49,7 @@ namespace LAMMPS_NS {
  *    6     potential energy, J: minus the sum of external force times position, which is m g h under gravity; means
  *          something for forces that are constant in space and time only
  *    7     energy stored in the material, J: springs and fluctuations of the grains, or elastic
- *    8     thermal energy, J: sum m c T
+ *    8     thermal energy, J: sum m c T, and what waits for the next thermal step
  *    9     frictional heat of the grains since their RVEs were made, J
  *   10     number of RVEs run in the last step
  *   11     worst unbalanced force ratio of all RVEs in the last step
@@ -151,6 +151,14 @@ class FixMPMCouple : public Fix {
   bigint points_before_exchange_ = -1;
   bool warned_time_step_ = false;
 
+  /* Thermal steps of several time steps (fix_mpm_couple_heat.cpp). */
+  int heat_every_ = 1;        /* time steps per thermal step as the command says; 0: found by heat_error_ */
+  double heat_error_ = 0.0;   /* largest change of a temperature in a thermal step over the range of temperatures */
+  bool heat_apart_ = false;   /* thermal steps are not simply time steps, or were not before a restart */
+  int64_t heat_left_ = 0;     /* time steps until the next thermal step; 0: it is due */
+  int64_t heat_steps_ = 1;    /* time steps of the last thermal step */
+  bigint heat_steps_done_ = 0, heat_steps_left_out_ = 0; /* in this run */
+
   bigint totals_step_ = -1; /* of totals_; -1: none */
   double totals_[TOTALS] = {};
   bool show_progress_ = false, progress_shown_ = false;
@@ -178,6 +186,13 @@ class FixMPMCouple : public Fix {
   void check_followed();
   void follow_walls();
   void check_time_step(bool starting);
+  void find_limits(double limit[2]) const;
+
+  void read_thermal_every(class KeywordParser &);
+  void begin_heat();
+  int64_t choose_heat_steps() const;
+  std::string heat_line() const;
+  std::string rve_lines() const;
 
   bool is_point(int i) const;
   void start_points();

@@ -69,8 +69,9 @@ void FixMPMCouple::unpack_restart(int i, int nth) {
 struct CoupleRecord {
   char magic[8];
   int64_t columns, last_number;
+  int64_t heat_apart, heat_left, heat_steps;
 };
-static const char RECORD_MAGIC[8] = {'m', 'p', 'm', 'c', 'o', 'u', 'p', '1'};
+static const char RECORD_MAGIC[8] = {'m', 'p', 'm', 'c', 'o', 'u', 'p', '2'};
 
 /* LIGGGHTS has closed the file. A file that cannot be sealed is no reason to lose the run, but to warn. */
 void FixMPMCouple::write_restart_file(char *file) {
@@ -86,6 +87,9 @@ void FixMPMCouple::write_restart(FILE *file) {
   memcpy(record.magic, RECORD_MAGIC, sizeof record.magic);
   record.columns = STATE_COLUMNS;
   record.last_number = last_number_;
+  record.heat_apart = heat_apart_;
+  record.heat_left = heat_left_;
+  record.heat_steps = heat_steps_;
   const int size = sizeof record;
   fwrite(&size, sizeof size, 1, file);
   fwrite(&record, sizeof record, 1, file);
@@ -97,6 +101,9 @@ void FixMPMCouple::restart(char *bytes) {
   if (memcmp(record.magic, RECORD_MAGIC, sizeof record.magic) != 0 || record.columns != STATE_COLUMNS)
     fix_failed(lmp, this, "the restart file holds no points of this fix, or those of another version");
   last_number_ = record.last_number;
+  heat_apart_ = heat_apart_ || record.heat_apart; /* what waits must still be given */
+  heat_left_ = record.heat_left;
+  heat_steps_ = record.heat_steps;
 }
 
 double FixMPMCouple::memory_usage() {

@@ -90,6 +90,7 @@ void FixMPMCouple::start_progress() {
   show_progress_ = comm->me == 0 && screen == stdout && is_terminal();
   progress_shown_ = false;
   run_started_ = progress_printed_ = base_seconds();
+  heat_steps_done_ = heat_steps_left_out_ = 0;
   particle_steps_before_ = rve_seconds_before_ = 0.0;
   if (!rve_) return;
   RveLawTotals law;
@@ -115,23 +116,30 @@ void FixMPMCouple::progress() {
 
 void FixMPMCouple::post_run() {
   if (progress_shown_) fprintf(screen, "\r\033[K");
-  if (!rve_) return;
+  std::string line = heat_line() + rve_lines();
+  if (comm->me != 0) return;
+  if (screen) fputs(line.c_str(), screen);
+  if (logfile) fputs(line.c_str(), logfile);
+}
+
+/* Collective. */
+std::string FixMPMCouple::rve_lines() const {
+  if (!rve_) return "";
   RveLawTotals law;
   fix_check(lmp, this, rve_law_totals(rve_->law(), &law));
   const double seconds = base_seconds() - run_started_, steps = (double)law.particle_steps - particle_steps_before_;
-  if (comm->me != 0 || steps <= 0.0) return;
+  if (steps <= 0.0) return "";
   std::string line = format_text(
       "Fix %s: %lld RVEs of %lld grains in all, %.4g DEM particle-steps, %.4g per second, %.0f %% of the time in "
       "RVEs\n",
       id, (long long)law.rves, (long long)law.grains, steps, steps / seconds,
       100.0 * (law.seconds - rve_seconds_before_) / seconds);
   line += format_text("Fix %s: %lld RVE steps so far: %lld computed, %lld copies of one with the same packing and history, "
-                      "%lld not run as their points rest\n",
-                      id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared), (long long)law.shared,
-                      (long long)law.rested);
+                      "%lld in free flight, %lld not run as their points rest\n",
+                      id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared - law.flown),
+                      (long long)law.shared, (long long)law.flown, (long long)law.rested);
   if (law.networks_solved > 0)
     line += format_text("Fix %s: conductivity of networks so far: %lld solved, %lld carried along from an earlier solution\n", id,
                         (long long)law.networks_solved, (long long)law.networks_kept);
-  if (screen) fputs(line.c_str(), screen);
-  if (logfile) fputs(line.c_str(), logfile);
+  return line;
 }

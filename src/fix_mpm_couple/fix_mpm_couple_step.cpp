@@ -178,6 +178,7 @@ void FixMPMCouple::final_integrate() {
   gather();
   for (size_t k = 0; k < walls_.size(); k++) walls_[k] = wall_fixes_[k]->present(update->dt);
   follow_walls();
+  begin_heat();
   fix_check(lmp, this, mpm_step(mpm_, points_.data(), (int)points_.size(), update->dt));
   scatter();
   for (size_t k = 0; k < walls_.size(); k++) wall_fixes_[k]->end_step(walls_[k], update->dt);

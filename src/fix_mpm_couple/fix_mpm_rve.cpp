@@ -52,7 +52,7 @@ FixMPMRve::~FixMPMRve() {
 void FixMPMRve::read_keywords(int narg, char **arg) {
   std::vector<std::string> keywords = {"packing", "model", "tangential", "density", "grain", "thickness", "damping",
                                        "pipe_resistance", "reference", "bonds", "substeps", "timestep/dem", "skin",
-                                       "rotation", "precision", "share", "rest", "backend", "threads", "replay",
+                                       "rotation", "precision", "share", "flight", "rest", "backend", "threads", "replay",
                                        "conductivity"};
   keywords.insert(keywords.end(), CONDUCTION_KEYWORDS.begin(), CONDUCTION_KEYWORDS.end());
   KeywordParser parser(lmp, this, narg, arg, 3, keywords);
@@ -74,6 +74,7 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
     else if (parser.is("skin")) scene_.skin = parser.number(NumberRange::positive());
     else if (parser.is("rotation")) scene_.rotation = parser.yes_no();
     else if (parser.is("share")) scene_.share = parser.yes_no();
+    else if (parser.is("flight")) scene_.flight = parser.yes_no();
     else if (parser.is("rest")) rest_error_ = parser.accept("no") ? 0.0 : parser.number(NumberRange::inside(0.0, 0.1));
     else if (parser.is("precision")) scene_.mixed = parser.choice({"double", "mixed"});
     else if (parser.is("backend"))

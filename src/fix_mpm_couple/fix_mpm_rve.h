@@ -23,7 +23,7 @@ namespace LAMMPS_NS {
  *   fix ID group mpm/rve packing FILE [FILE2 ...] model hooke/stiffness tangential history|off density RHO
  *       [grain disk|sphere] [thickness Z] [damping none|local A|viscous F] [pipe_resistance A] [reference T0]
  *       [bonds strength B shear_ratio M melting TS|none] [substeps N] [timestep/dem DT] [skin S] [rotation yes|no]
- *       [precision double|mixed] [share yes|no] [backend auto|cpu|cuda] [threads N] [replay DIRECTORY|none]
+ *       [precision double|mixed] [share yes|no] [flight yes|no] [backend auto|cpu|cuda] [threads N] [replay DIRECTORY|none]
  *       [direct MODEL] [indirect MODEL] [their keywords: conduction_keywords.h]
  *       [conductivity affine|network [change E] [every N]]
  *

@@ -232,6 +232,7 @@ void FixMPMWall::move_facets(double dt) {
 
 MpmWall FixMPMWall::present(double dt) {
   MpmWall wall = wall_;
+  wall.heat_flow = sums_[HEAT_FLOW]; /* holds between thermal steps */
   if (wall_.kind == MPM_WALL_SURFACE) {
     move_facets(dt);
     wall.facets = present_facets_.data();

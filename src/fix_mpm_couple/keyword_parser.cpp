@@ -82,8 +82,8 @@ double KeywordParser::number(const NumberRange &range) {
   return value;
 }
 
-int64_t KeywordParser::long_integer(int64_t low, int64_t high) {
-  const std::string allowed = "a whole number from " + std::to_string(low) + " to " + std::to_string(high);
+int64_t KeywordParser::long_integer(int64_t low, int64_t high, const char *others) {
+  const std::string allowed = others + std::string("a whole number from ") + std::to_string(low) + " to " + std::to_string(high);
   const std::string text = take(allowed);
   if (text.empty() || text.find_first_not_of("0123456789+-") != std::string::npos) refuse(text, allowed);
   char *end;
@@ -93,7 +93,7 @@ int64_t KeywordParser::long_integer(int64_t low, int64_t high) {
   return value;
 }
 
-int KeywordParser::integer(int low, int high) { return (int)long_integer(low, high); }
+int KeywordParser::integer(int low, int high, const char *others) { return (int)long_integer(low, high, others); }
 
 std::string KeywordParser::word(const std::string &allowed) {
   const std::string text = take(allowed);

@@ -40,8 +40,9 @@ class KeywordParser : protected Pointers {
 
   /* Values of the present keyword. */
   double number(const NumberRange &range);
-  int integer(int low, int high);
-  int64_t long_integer(int64_t low, int64_t high);
+  /* others: what else is allowed, for the message. */
+  int integer(int low, int high, const char *others = "");
+  int64_t long_integer(int64_t low, int64_t high, const char *others = "");
   std::string word(const std::string &allowed);
   int choice(const std::vector<std::string> &words); /* its index */
   bool yes_no();

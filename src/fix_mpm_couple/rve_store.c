@@ -361,6 +361,7 @@ void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
     int64_t solved, kept;
     rve_batch_network_counts(store->batch[b], &solved, &kept);
     totals->shared += rve_batch_shared(store->batch[b]), totals->solved += solved, totals->kept += kept;
+    totals->flown += rve_batch_flown(store->batch[b]);
   }
   for (int s = 0; s < store->slots; s++)
     if (store->slot[s].batch >= 0) totals->grains += store->slot[s].item.grains;

@@ -69,8 +69,7 @@ void grain_spring_before(const GrainMotion *motion, const double stiffness[2], c
                          const double after[3], double before[3]) {
   const double distance = sqrt(dot(motion->branch, motion->branch)), length = sqrt(dot(after, after));
   double normal[3], slide[3];
-  for (int a = 0; a < 3; a++) normal[a] = motion->branch[a] / distance;
-  find_tangential_velocity(motion, normal, distance, slide);
+  grain_tangential_velocity(motion, distance, normal, slide);
   double stretch = 1.0; /* of the trial state, which is parallel to `after` */
   if (length > 0.0 && stiffness[1] * length >= limit[1] * (1.0 - 1e-9)) {
     /* |trial - slide step| is the length that the limit allowed before */

@@ -64,6 +64,10 @@ typedef struct MpmPoint {
   double heat_capacity;         /* specific, J/(kg K); required if thermal */
   double heat;                  /* W/m3 from the law */
   double heat_external;         /* W, from walls or fixes, this step */
+  /* Of thermal steps longer than the mechanical ones (mpm_set_heat_duration), else 0: */
+  double temperature_rate;      /* K/s, of the last thermal step; held until the next */
+  double heat_waiting;          /* J from law and fixes that the temperature has not got yet */
+  double heat_power;            /* W, at which the last thermal step gives what waited then */
   double conductivity[6];       /* W/(m K) */
   double modulus;               /* Pa */
   double scalars[MPM_LAW_SCALARS];
@@ -108,7 +112,7 @@ typedef struct MpmWall {
   double reaction[3];          /* force of the wall on the body, N */
   double power_friction;       /* W dissipated by wall friction (not heat of the body unless asked) */
   double power_motion;         /* W, work of the moving wall on the body */
-  double heat_flow;            /* W into the body */
+  double heat_flow;            /* W into the body; in steps without heat (mpm_set_heat_duration) left as the caller gives it */
 } MpmWall;
 MpmWall mpm_wall_default(void);
 BaseStatus mpm_wall_check(const MpmWall *wall, int dimension, int thermal);
@@ -156,6 +160,12 @@ double mpm_smallest_spacing(const Mpm *mpm);
 BaseStatus mpm_set_walls(Mpm *mpm, MpmWall *walls, int count);            /* borrowed; outputs are written into them */
 BaseStatus mpm_set_tractions(Mpm *mpm, const MpmTraction *tractions, int count); /* copied */
 
+/* Heat in steps of its own, from the next step on. duration < 0 (so at first): each step conducts for its own dt. > 0: the next
+ * step finds the rates of temperature for `duration` s, a whole number of steps; 0: the next step only goes on with them (temperatures
+ * change linearly meanwhile, which is explicit Euler with steps of `duration`). Sources are collected in every step and given
+ * evenly over the thermal step that follows, so that no heat is lost: thermal_energy of mpm_totals() includes what waits. */
+void mpm_set_heat_duration(Mpm *mpm, double duration);
+
 /* One step of dt seconds: P2G, grid, law, G2P in the scene's order. points [count] in and out, order kept. Collective.
  * BASE_ERROR_UNSTABLE names the first (lowest tag) point that is not finite. */
 BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt);
@@ -178,7 +188,7 @@ void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, 
 
 /* Sums over this rank's own points (caller reduces over ranks). */
 typedef struct MpmTotals {
-  double mass, momentum[3], kinetic_energy, thermal_energy /* sum m c T */, heat_power /* W, sum V Q */;
+  double mass, momentum[3], kinetic_energy, thermal_energy /* sum m c T, and heat_waiting */, heat_power /* W, sum V Q */;
 } MpmTotals;
 void mpm_totals(const MpmPoint *points, int count, MpmTotals *totals);
 
@@ -189,7 +199,7 @@ typedef struct MpmGridView {
   const int *index;          /* [nodes][3] */
   const double *mass;        /* [nodes] */
   const double *velocity;    /* [nodes][3] */
-  const double *temperature; /* [nodes]; NULL if not thermal */
+  const double *temperature; /* [nodes]; NULL if the step was not thermal */
   const unsigned char *owned;/* [nodes] 1 if this rank holds the node's lowest-tag point: owned by exactly one rank */
 } MpmGridView;
 void mpm_grid_view(Mpm *mpm, MpmGridView *view);

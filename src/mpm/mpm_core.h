@@ -156,6 +156,8 @@ struct Mpm {
   MpmVec per_length;  /* lane 1 + i: 1 / spacing[i]; lane 0: 1 / the scene's spacing */
   int threads; /* OpenMP threads of a pass */
   double dt;
+  double heat_duration; /* s, of mpm_set_heat_duration() */
+  int heats;            /* this step finds rates of temperature */
   MpmPoints points;
   MpmGrid grid;
   MpmContact *contacts;
@@ -187,7 +189,7 @@ static inline int mpm_width(const Mpm *mpm) { return mpm_shape_width(mpm->scene.
 static inline int mpm_load_width(const Mpm *mpm) { return 1 + mpm->scene.dimension; }
 
 /* The array of loads is needed where something adds to what stress and external force alone give. */
-static inline int mpm_uses_load(const Mpm *mpm) { return mpm->halo || mpm->scene.thermal || mpm->traction_count > 0; }
+static inline int mpm_uses_load(const Mpm *mpm) { return mpm->halo || mpm->heats || mpm->traction_count > 0; }
 /* The law acts on rows where they lie. */
 static inline int mpm_law_is_local(const Mpm *mpm) {
   return mpm->law->advance && !mpm->scene.thermal && !mpm->law->thermal;
@@ -263,6 +265,9 @@ BaseStatus mpm_load_fill(Mpm *mpm);
 void mpm_heat_start(Mpm *mpm);                                       /* nodal temperature, temperature walls */
 void mpm_heat_update(Mpm *mpm);                                      /* rate of nodal temperature, walls' heat flow */
 void mpm_heat_walls(Mpm *mpm, MpmVec *load); /* flux walls: heat of the outermost points */
+double mpm_heat_source(const Mpm *mpm, int row); /* W, of a point: law, fixes */
+void mpm_heat_collect(Mpm *mpm);             /* sources -> heat_waiting, at thermal steps -> heat_power */
+void mpm_heat_carry(Mpm *mpm);               /* temperatures by the rates that the last thermal step left */
 
 /* mpm_wall.c */
 BaseStatus mpm_wall_find(Mpm *mpm);       /* contacts: the nodes under each wall; zeroes the walls' outputs */

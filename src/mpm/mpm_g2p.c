@@ -116,6 +116,11 @@ MPM_INLINE void update_affine(const Mpm *mpm, int k, const int *row, const MpmWe
 /* Eq. 28 and 29. */
 static void update_temperature(Mpm *mpm, int k, double mapped, double rate) {
   MpmPoint *point = &mpm->points.home[mpm->points.slot[k]];
+  if (mpm->heat_duration >= 0.0) { /* mpm_heat_carry() does the rest */
+    point->temperature_mapped = mapped;
+    point->temperature_rate = rate;
+    return;
+  }
   point->temperature += mpm->dt * rate;
   point->temperature_mapped = mapped + mpm->dt * rate;
   if (!isfinite(point->temperature)) mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "temperature is not finite");
@@ -147,7 +152,7 @@ MPM_INLINE void update_body(Mpm *mpm, int first, int end, int is_flip, int dimen
       mpm_find_weights(mpm, k, &base, shape, &w);
       const MpmVec value = mpm_gather_value(grid->state, row, &w, dimension, width);
       const MpmVec rate = mpm_gather_value(grid->rate, row, &w, dimension, width);
-      if (!is_flip && scene->thermal) update_temperature(mpm, k, value[0], rate[0]);
+      if (!is_flip && mpm->heats) update_temperature(mpm, k, value[0], rate[0]);
       if (!is_flip && !scene->mechanical) continue;
       if (!is_flip && scene->transfer == MPM_TRANSFER_XPIC)
         extended = mpm_gather_value(grid->extended, row, &w, dimension, width);
@@ -171,7 +176,7 @@ MPM_CLONES static void update_any(Mpm *mpm, int first, int end) {
 
 void mpm_g2p_update(Mpm *mpm) {
   const MpmScene *scene = &mpm->scene;
-  if (scene->transfer == MPM_TRANSFER_FLIP && scene->mechanical && !scene->thermal) {
+  if (scene->transfer == MPM_TRANSFER_FLIP && scene->mechanical && !mpm->heats) {
     FOR_CHUNKS(mpm, update_flip(mpm, first, end))
   } else {
     FOR_CHUNKS(mpm, update_any(mpm, first, end))

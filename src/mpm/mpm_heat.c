@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Heat on the grid: explicit, lumped capacity (TM-DEMPM eq. 14-21, signs of the loads as corrected in eq. 17). */
+#include <math.h>
+
 #include "mpm_core.h"
 
 /* T_I = sum m c S T_p / C_I; nodes under a temperature wall take the wall's (the last wall's, if there are several). */
@@ -29,6 +31,38 @@ void mpm_heat_update(Mpm *mpm) {
     grid->rate[n][0] = carries ? grid->rate[n][0] / grid->heat[n][0] : 0.0;
   }
 }
+
+/* -------------------------------------------------------------------------------------------- steps of its own */
+
+double mpm_heat_source(const Mpm *mpm, int row) {
+  const MpmPoint *point = &mpm->points.home[mpm->points.slot[row]];
+  return (mpm->scene.mechanical ? mpm_row_volume(mpm, row) * point->heat : 0.0) + point->heat_external;
+}
+
+void mpm_heat_collect(Mpm *mpm) {
+  MpmPoints *p = &mpm->points;
+#pragma omp parallel for num_threads(mpm->threads) if (mpm_is_parallel(mpm))
+  for (int k = 0; k < p->live; k++) {
+    MpmPoint *point = &p->home[p->slot[k]];
+    point->heat_waiting += mpm->dt * mpm_heat_source(mpm, k);
+    if (mpm->heats) point->heat_power = point->heat_waiting / mpm->heat_duration;
+  }
+}
+
+void mpm_heat_carry(Mpm *mpm) {
+  MpmPoints *p = &mpm->points;
+#pragma omp parallel for num_threads(mpm->threads) if (mpm_is_parallel(mpm))
+  for (int k = 0; k < p->live; k++) {
+    MpmPoint *point = &p->home[p->slot[k]];
+    const double change = mpm->dt * point->temperature_rate;
+    point->temperature += change;
+    point->temperature_mapped += change;
+    point->heat_waiting -= mpm->dt * point->heat_power;
+    if (!isfinite(point->temperature)) mpm_note_point(mpm, BASE_ERROR_UNSTABLE, point->tag, "temperature is not finite");
+  }
+}
+
+/* ------------------------------------------------------------------------------------------------------- walls */
 
 static void add_flux(Mpm *mpm, MpmWall *wall, int row, double distance, const double normal[3], MpmVec *load) {
   double vector[3], f[9];

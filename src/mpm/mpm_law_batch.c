@@ -159,7 +159,7 @@ static void add_heat(const Mpm *mpm, int k, MpmVec *load) {
   const MpmPoint *point = &mpm->points.home[mpm->points.slot[k]];
   const int dimension = mpm->scene.dimension;
   const double volume = mpm_row_volume(mpm, k);
-  load[0][0] = (mpm->scene.mechanical ? volume * point->heat : 0.0) + point->heat_external;
+  load[0][0] = mpm->heat_duration < 0.0 ? mpm_heat_source(mpm, k) : point->heat_power;
   for (int j = 0; j < dimension; j++) {
     double flux = 0.0;
     for (int l = 0; l < dimension; l++) flux -= point->conductivity[voigt[j][l]] * point->temperature_gradient[l];
@@ -178,7 +178,7 @@ static void fill_own_loads(Mpm *mpm) {
       if (width == 3) mpm_row_load(mpm, k, 2, load);
       else mpm_row_load(mpm, k, 3, load);
     }
-    if (mpm->scene.thermal) add_heat(mpm, k, load);
+    if (mpm->heats) add_heat(mpm, k, load);
   }
 }
 
@@ -204,6 +204,6 @@ BaseStatus mpm_load_fill(Mpm *mpm) {
   }
   fill_own_loads(mpm);
   if (p->live > 0 && mpm->scene.mechanical) mpm_traction_add(mpm, p->load);
-  if (p->live > 0 && mpm->scene.thermal) mpm_heat_walls(mpm, p->load);
+  if (p->live > 0 && mpm->heats) mpm_heat_walls(mpm, p->load);
   return mpm->halo ? forward_loads(mpm) : BASE_OK;
 }

@@ -50,6 +50,7 @@ BaseStatus mpm_create(const MpmScene *scene, const MpmLaw *law, const MpmHalo *h
   const double unstretched[3] = {1.0, 1.0, 1.0};
   set_spacing(mpm, unstretched);
   mpm->threads = scene->threads > 0 ? scene->threads : omp_get_max_threads();
+  mpm->heat_duration = -1.0;
   *result = mpm;
   return BASE_OK;
 }
@@ -64,6 +65,8 @@ void mpm_destroy(Mpm *mpm) {
 }
 
 const MpmScene *mpm_scene(const Mpm *mpm) { return &mpm->scene; }
+
+void mpm_set_heat_duration(Mpm *mpm, double duration) { mpm->heat_duration = duration; }
 
 BaseStatus mpm_set_walls(Mpm *mpm, MpmWall *walls, int count) {
   if (count < 0) return base_error(BASE_ERROR_ARGUMENT, "walls: count is %d; allowed: >= 0", count);
@@ -172,7 +175,7 @@ static BaseStatus gather_points(Mpm *mpm) {
   p->count = p->own + p->foreign;
   if (!has_failed(mpm)) mpm_points_load_foreign(mpm, foreign);
   drop_points_if_failed(mpm);
-  if (mpm->scene.thermal) mpm_points_load_heat(mpm, foreign);
+  if (mpm->heats) mpm_points_load_heat(mpm, foreign);
   const BaseStatus status = mpm_grid_build(mpm);
   if (status == BASE_ERROR_MEMORY) return status;
   mpm_note_error(mpm, status);
@@ -226,14 +229,14 @@ static void find_node_acceleration(Mpm *mpm) {
 }
 
 static BaseStatus start_grid(Mpm *mpm) {
-  mpm_p2g_momentum(mpm, mpm->points.motion, mpm->scene.thermal, mpm->scene.transfer == MPM_TRANSFER_APIC);
+  mpm_p2g_momentum(mpm, mpm->points.motion, mpm->heats, mpm->scene.transfer == MPM_TRANSFER_APIC);
   find_node_velocity(mpm);
   mpm->contact_count = mpm->has_corners = 0;
   if (mpm->wall_count > 0) {
     mpm_grid_find_index(mpm);
     TRY(mpm_wall_find(mpm));
   }
-  if (mpm->scene.thermal) mpm_heat_start(mpm);
+  if (mpm->heats) mpm_heat_start(mpm);
   if (mpm->scene.mechanical) mpm_wall_start(mpm);
   return BASE_OK;
 }
@@ -241,18 +244,20 @@ static BaseStatus start_grid(Mpm *mpm) {
 /* Rates at the nodes -> points. */
 static BaseStatus advance(Mpm *mpm) {
   find_node_acceleration(mpm);
-  if (mpm->scene.thermal) mpm_heat_update(mpm);
+  if (mpm->heats) mpm_heat_update(mpm);
   if (mpm->scene.mechanical) {
     mpm_wall_update(mpm);
     if (mpm->scene.transfer == MPM_TRANSFER_XPIC) TRY(mpm_extended_velocity(mpm));
   }
   mpm_g2p_update(mpm);
+  if (mpm->scene.thermal && mpm->heat_duration >= 0.0) mpm_heat_carry(mpm);
   if (mpm->scene.mechanical) mpm_wall_guard(mpm);
   return BASE_OK;
 }
 
 /* Forces and heat at the points -> rates at the nodes. */
 static BaseStatus find_rates(Mpm *mpm) {
+  if (mpm->scene.thermal && mpm->heat_duration >= 0.0) mpm_heat_collect(mpm);
   TRY(mpm_load_fill(mpm));
   mpm_p2g_load(mpm);
   return BASE_OK;
@@ -287,7 +292,7 @@ static BaseStatus step_law_first(Mpm *mpm) {
     mpm_stress(mpm, is_fused);
   } else {
     if (mpm->scene.mechanical) mpm_g2p_velocity_gradient(mpm);
-    if (mpm->scene.thermal) mpm_g2p_temperature_gradient(mpm);
+    if (mpm->heats) mpm_g2p_temperature_gradient(mpm);
     if (mpm->scene.mechanical) TRY(mpm_law_run(mpm, mpm->dt)); /* at rest conductivities stay what they were */
   }
   drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
@@ -297,7 +302,7 @@ static BaseStatus step_law_first(Mpm *mpm) {
 
 /* USL, MUSL: the law last, with the updated velocity. */
 static BaseStatus step_law_last(Mpm *mpm) {
-  if (mpm->scene.thermal) mpm_g2p_temperature_gradient(mpm);
+  if (mpm->heats) mpm_g2p_temperature_gradient(mpm);
   TRY(find_rates(mpm));
   TRY(advance(mpm));
   if (mpm->scene.mechanical) {
@@ -327,6 +332,7 @@ static BaseStatus check_count(int count) {
 static BaseStatus step_rows(Mpm *mpm, double dt) {
   mpm->dt = dt;
   mpm->state_is_new = 0;
+  mpm->heats = mpm->scene.thermal && mpm->heat_duration != 0.0;
   TRY(gather_points(mpm));
   TRY(start_grid(mpm));
   TRY(mpm->scene.order == MPM_ORDER_USF ? step_law_first(mpm) : step_law_last(mpm));
@@ -375,13 +381,13 @@ void mpm_grid_view(Mpm *mpm, MpmGridView *view) {
     const MpmVec state = grid->state[n] + step * grid->rate[n];
     grid->view_mass[n] = grid->sum[n][0];
     for (int i = 0; i < 3; i++) grid->view_velocity[3 * n + i] = state[1 + i];
-    if (mpm->scene.thermal) grid->view_temperature[n] = state[0];
+    if (mpm->heats) grid->view_temperature[n] = state[0];
   }
   *view = (MpmGridView){.nodes = grid->nodes,
                         .spacing = {mpm->spacing[0], mpm->spacing[1], mpm->spacing[2]},
                         .index = (const int *)grid->index,
                         .mass = grid->view_mass,
                         .velocity = grid->view_velocity,
-                        .temperature = mpm->scene.thermal ? grid->view_temperature : NULL,
+                        .temperature = mpm->heats ? grid->view_temperature : NULL,
                         .owned = grid->owned};
 }

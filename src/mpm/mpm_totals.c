@@ -14,7 +14,7 @@ void mpm_totals(const MpmPoint *points, int count, MpmTotals *totals) {
       totals->momentum[i] += point->mass * point->velocity[i];
       totals->kinetic_energy += 0.5 * point->mass * point->velocity[i] * point->velocity[i];
     }
-    totals->thermal_energy += point->mass * point->heat_capacity * point->temperature;
+    totals->thermal_energy += point->mass * point->heat_capacity * point->temperature + point->heat_waiting;
     totals->heat_power += point->volume0 * tensor_determinant(point->deformation_gradient) * point->heat;
   }
 }

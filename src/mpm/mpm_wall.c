@@ -31,9 +31,10 @@ static BaseStatus find_one(Mpm *mpm, int w) {
   MpmWall *wall = &mpm->walls[w];
   double normal[3];
   for (int i = 0; i < 3; i++) wall->reaction[i] = 0.0;
-  wall->power_friction = wall->power_motion = wall->heat_flow = 0.0;
+  wall->power_friction = wall->power_motion = 0.0;
+  if (mpm->heats || !mpm->scene.thermal) wall->heat_flow = 0.0; /* else that of the last thermal step goes on */
   if (wall->kind == MPM_WALL_SURFACE) return mpm_surface_find(mpm, w);
-  if (wall->contact == MPM_WALL_NO_CONTACT && wall->heat != MPM_WALL_TEMPERATURE) return BASE_OK;
+  if (wall->contact == MPM_WALL_NO_CONTACT && (wall->heat != MPM_WALL_TEMPERATURE || !mpm->heats)) return BASE_OK;
   for (int n = 0; n < mpm->grid.nodes; n++)
     if (mpm_wall_is_under(mpm, wall, n, normal)) TRY(mpm_wall_add(mpm, n, w, normal, wall->velocity));
   return BASE_OK;

@@ -70,10 +70,12 @@ def test_a_settled_column_costs_a_tenth_and_stands_as_before(dempm, grains, tmp_
 
 def test_a_collapse_is_the_same_with_rest(dempm, grains, tmp_path):
     """Once the column flows its packings are run again. The first 0.05 s agree; later any two collapses drift apart by some per cent
-    of the largest kinetic energy (gravity of 9.801: 2 %; rest: 5 % measured), as grains take other turns."""
+    of the largest kinetic energy (gravity of 9.801: 2 %; rest: 5 % measured), as grains take other turns. Free flights, whose round-off
+    does the same (frictional heat: 5 %), are off: this is about rest."""
+    stepped = lambda text: text.replace(" rest ", " flight no rest ", 1)
     files, collapse = [grains], "unfix right\nrun 2000\n"
-    dempm(scene("no", "run 3000\nwrite_restart half\n"), files=files, cwd=tmp_path, timeout=300)
-    tables = [dempm(scene(rest, "run 200\n" + collapse, damping=0, continued=True), files=files, cwd=tmp_path,
+    dempm(stepped(scene("no", "run 3000\nwrite_restart half\n")), files=files, cwd=tmp_path, timeout=300)
+    tables = [dempm(stepped(scene(rest, "run 200\n" + collapse, damping=0, continued=True)), files=files, cwd=tmp_path,
                     timeout=300).table for rest in ("no", "1e-3")]
     kinetic, heat = (np.array([table[name] for table in tables]) for name in ("mpm[5]", "mpm[9]"))
     assert kinetic[0].max() > 10.0

@@ -179,12 +179,67 @@ static void walls_and_sources_balance_the_heat_of_the_body(void **state) {
   law.destroy(law.content);
 }
 
+typedef struct Ledger {
+  double given, worst; /* J: heat from walls and sources; largest gap between it and the heat of the points */
+} Ledger;
+
+/* `steps` time steps between a hot wall and a flux, from the start; `every` of them per thermal step (0: plain ones). The sources of a
+ * thermal step are given in the next one: `delay` does the same to plain steps. Returns the points. */
+static MpmPoint *run_thermal_steps(int steps, double dt, int every, double source, double delay, int *count, Ledger *ledger) {
+  const MpmScene scene = heat_scene(2, 0.1, MPM_SHAPE_GIMP);
+  const double conductivity[6] = {0.3, 0.3, 0.3, 0, 0, 0}, low[3] = {0, 0, 0};
+  const int number[3] = {20, 4, 1};
+  MpmLaw law;
+  Mpm *mpm = make_heat(&scene, conductivity, &law);
+  MpmWall walls[2] = {plane_wall(0, 0.0, 1.0, MPM_WALL_NO_CONTACT), plane_wall(0, 1.0, -1.0, MPM_WALL_NO_CONTACT)};
+  walls[0].heat = MPM_WALL_TEMPERATURE, walls[0].temperature = 3.0;
+  walls[1].heat = MPM_WALL_FLUX, walls[1].flux = 2.0;
+  OK(mpm_set_walls(mpm, walls, 2));
+  MpmPoint *points = make_box(2, low, number, 0.05, 1.0, 1, count);
+  OK(mpm_initialise(mpm, points, *count));
+  *ledger = (Ledger){0.0, 0.0};
+  for (int s = 0; s < steps; s++) {
+    const double power = s == 0 ? source * delay : source;
+    for (int p = 0; p < *count; p++) points[p].heat_external = power;
+    if (every > 0) mpm_set_heat_duration(mpm, s % every == 0 ? every * dt : 0.0);
+    OK(mpm_step(mpm, points, *count, dt));
+    ledger->given += dt * (walls[0].heat_flow + walls[1].heat_flow + power * *count);
+    MpmTotals totals;
+    mpm_totals(points, *count, &totals);
+    ledger->worst = fmax(ledger->worst, fabs(totals.thermal_energy - ledger->given));
+  }
+  mpm_destroy(mpm);
+  law.destroy(law.content);
+  return points;
+}
+
+/* Thermal steps of four time steps: the same as time steps four times as long where nothing moves; heat, with what waits, is kept
+ * at every time step, also when the last thermal step is not over. */
+static void thermal_steps_of_their_own_are_longer_euler_steps_and_lose_no_heat(void **state) {
+  (void)state;
+  const double dt = 2e-3;
+  int count;
+  Ledger ledger;
+  /* The first thermal step finds the sources of one time step waiting. */
+  MpmPoint *fine = run_thermal_steps(400, dt, 4, 0.01, 1.0, &count, &ledger);
+  MpmPoint *coarse = run_thermal_steps(100, 4.0 * dt, 0, 0.01, 0.25, &count, &ledger);
+  double difference = 0.0;
+  for (int p = 0; p < count; p++) difference = fmax(difference, fabs(fine[p].temperature - coarse[p].temperature));
+  printf("thermal steps of four time steps beside time steps four times as long: %.1e K\n", difference);
+  AT_MOST(difference, 1e-12);
+  free(fine), free(coarse);
+  fine = run_thermal_steps(403, dt, 4, 0.01, 1.0, &count, &ledger);
+  AT_MOST(ledger.worst, 1e-12 * ledger.given);
+  free(fine);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_sine_profile_decays_with_second_order),
       cmocka_unit_test(an_insulated_body_keeps_its_heat_and_evens_out),
       cmocka_unit_test(a_turned_conductivity_gives_the_turned_answer),
       cmocka_unit_test(walls_and_sources_balance_the_heat_of_the_body),
+      cmocka_unit_test(thermal_steps_of_their_own_are_longer_euler_steps_and_lose_no_heat),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,7 +19,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent.parent), str(pathlib.Path(__file__).resolve().parent)]
+import resume  # noqa: E402
 from conftest import BUILD, ROOT, environment, parse_dump, parse_thermo  # noqa: E402
 
 EXAMPLES = ROOT / "examples"
@@ -68,24 +69,82 @@ class Study:
         wanted = {"script": str(script), "variables": variables, "program": program.stat().st_mtime, "files": digest.hexdigest()}
         if mark.exists() and json.loads(mark.read_text())["wanted"] == wanted:
             return self.read(path, json.loads(mark.read_text()), grains)
-        shutil.rmtree(path, ignore_errors=True)
-        path.mkdir(parents=True)
-        for source in sources:
-            shutil.copy(source, path)
-        (path / "out").mkdir(exist_ok=True)
-        command = [program, "-in", script] + [w for key, value in variables.items() for w in ("-var", key, *value)]
-        if ranks > 1:
-            command = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks), *command]
-        start = time.monotonic()
-        with open(path / "screen", "w") as screen:
-            code = subprocess.run([str(word) for word in command], cwd=path, env=environment(max(threads // ranks, 1)),
-                                  stdin=subprocess.DEVNULL, stdout=screen, stderr=subprocess.STDOUT, timeout=timeout).returncode
+        begun = path / "begun.json"  # what was cut goes on only with the same program and files
+        cut = begun.exists() and json.loads(begun.read_text())["wanted"] == wanted
+        if not cut:
+            shutil.rmtree(path, ignore_errors=True)
+            path.mkdir(parents=True)
+            for source in sources:
+                shutil.copy(source, path)
+            (path / "out").mkdir(exist_ok=True)
+            begun.write_text(json.dumps({"wanted": wanted, "seconds": 0.0}))
+        launch = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks)] if ranks > 1 else []
+        words = [w for key, value in variables.items() for w in ("-var", key, *value)]
+        code = self.go_on(name, path, script, lambda file: [*launch, program, "-in", file, *words],
+                          environment(max(threads // ranks, 1)), timeout)
         if code != 0:
             tail = "\n".join((path / "screen").read_text(errors="replace").splitlines()[-8:])
             raise RuntimeError(f"{self.case}: {name} ended with {code}\n{tail}")
-        done = {"wanted": wanted, "seconds": round(time.monotonic() - start, 2)}
+        resume.merge(path)
+        for file in resume.restart_files(path):
+            file.unlink()
+        done = {"wanted": wanted, "seconds": round(json.loads(begun.read_text())["seconds"], 2)}
         mark.write_text(json.dumps(done))
         return self.read(path, done, grains)
+
+    def go_on(self, name, path, script, command, env, timeout):
+        """Runs a script from its start, or, if it was cut, from its newest restart file that is whole. Returns the exit code."""
+        text = (path / script).read_text()
+        if not (self.full and resume.RUN.search(text)):
+            return self.launch(name, path, command(script), env, timeout, None)
+        (path / "in.saving").write_text(resume.with_restarts(text))
+        resume.set_aside(path)
+        first = path / "part.0" / "log.liggghts"
+        last = resume.last_step(first.read_text(errors="replace")) if first.exists() else None
+        for saved in resume.restart_files(path) if last is not None else []:
+            (path / "in.resumed").write_text(resume.continuation(text, saved.name, last))
+            code = self.launch(name, path, command("in.resumed"), env, timeout, last)
+            if code == 0 or resume.first_step((path / "log.liggghts").read_text(errors="replace")) is not None:
+                return code
+        for part in path.glob("part.*"):
+            shutil.rmtree(part)
+        return self.launch(name, path, command("in.saving"), env, timeout, None)
+
+    def launch(self, name, path, command, env, timeout, last):
+        """Runs a command and tells its progress; the seconds that it took join those of earlier parts."""
+        begun, start = path / "begun.json", time.monotonic()
+        before = json.loads(begun.read_text())
+        with open(path / "screen", "w") as screen:
+            process = subprocess.Popen([str(word) for word in command], cwd=path, env=env, stdin=subprocess.DEVNULL, stdout=screen,
+                                       stderr=subprocess.STDOUT)
+            told = (start, 0.0)
+            while process.poll() is None:
+                passed = time.monotonic() - start
+                begun.write_text(json.dumps({**before, "seconds": before["seconds"] + passed}))
+                if timeout and passed > timeout:
+                    process.kill()
+                    process.wait()
+                    raise subprocess.TimeoutExpired(command, timeout)
+                told = self.tell_progress(name, path, start, last, told, process)
+                time.sleep(min(1.0, 0.01 + 0.05 * passed))
+        begun.write_text(json.dumps({**before, "seconds": before["seconds"] + time.monotonic() - start}))
+        return process.returncode
+
+    def tell_progress(self, name, path, start, last, told, process):
+        """Every minute, or 10 %: part of the run that is done, and time that the rest will take. told: (when, part) last time."""
+        if not self.full or time.monotonic() - told[0] < 5.0 or not (path / "log.liggghts").exists():
+            return told
+        log = (path / "log.liggghts").read_text(errors="replace")
+        end = last if last is not None else resume.last_step(log)
+        first, step = resume.first_step(log), resume.present_step(log)
+        if end is None or step is None or step == first:
+            return told
+        part, now = (step - first) / (end - first), time.monotonic()
+        if part - told[1] < 0.1 and now - told[0] < 60.0:
+            return told
+        left = (now - start) * (1.0 - part) / part
+        print(f"  {self.case}: {name}: step {step} of {end}, {100 * part:.0f} %, {left / 60:.0f} min left", flush=True)
+        return now, part
 
     def read(self, path, done, grains):
         log = (path / "log.liggghts").read_text(errors="replace")

@@ -5,7 +5,8 @@
    verify.py [--full] [case ...]        from the root (make verify, make verify-full)
 
 Writes build/verify (build/verify-full): report.json, report.md, figures. Ends with 1 if a bound is missed or a run fails. A
-finished run is not repeated, so that an interrupted verification goes on with the run that was cut."""
+finished run is not repeated, so that an interrupted verification goes on with the run that was cut; with --full from its last
+restart file, bit for bit, and each run tells its progress and the time left."""
 import argparse
 import importlib
 import json
@@ -60,8 +61,9 @@ def main():
         parser.error(f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(CASES)}")
     folder = BUILD / ("verify-full" if arguments.full else "verify")
     start, failed, studies = time.monotonic(), [], []
-    for name in arguments.cases or CASES:
-        print(f"{name}", flush=True)
+    wanted = arguments.cases or CASES
+    for k, name in enumerate(wanted):
+        print(f"{name} ({k + 1} of {len(wanted)}, {time.monotonic() - start:.0f} s so far)", flush=True)
         study = Study(name, folder, arguments.full)
         studies.append(study)
         try:
