@@ -45,6 +45,17 @@ MPM_INLINE void mpm_find_weights(const Mpm *mpm, int k, const MpmCellBase *cell,
   mpm_shape_axes(shape, w->f, shape == MPM_SHAPE_GIMP ? p->half[k] : mpm_vec_all(0.5), w->value, w->slope);
 }
 
+/* What is floored to find the cell, over h. */
+MPM_INLINE MpmVec mpm_anchor(const Mpm *mpm, MpmShape shape, MpmVec origin, MpmVec position, MpmVec half) {
+  const MpmVec u = (position - origin) * mpm->per_length;
+  return shape == MPM_SHAPE_LINEAR ? u : shape == MPM_SHAPE_BSPLINE ? u - 0.5 : u - half;
+}
+/* Lanes of axes along which a point is still in the cell. */
+MPM_INLINE MpmMask mpm_is_in_cell(const Mpm *mpm, MpmShape shape, MpmVec position, MpmVec half, const MpmCellBase *cell) {
+  const MpmVec anchor = mpm_anchor(mpm, shape, cell->origin, position, half);
+  return (anchor >= cell->base) & (anchor < cell->base + 1.0);
+}
+
 /* Rows of a cell in the order of tags: `count` stretches. */
 typedef struct MpmRuns {
   int count, own[2];
@@ -67,14 +78,16 @@ MPM_INLINE double mpm_across(const MpmVec *y, const MpmVec *z, int r, int dimens
 }
 
 MPM_INLINE MpmVec mpm_gather_value(const MpmVec *field, const int *row, const MpmWeights *w, int dimension, int width) {
-  MpmVec value = {0.0, 0.0, 0.0, 0.0};
+  MpmVec value = mpm_vec_all(0.0); /* sums begin with their first term: the compiler must not drop 0.0 + x */
   const int rows = dimension == 3 ? width * width : width;
 #pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {
-    MpmVec along = {0.0, 0.0, 0.0, 0.0};
+    const MpmVec *node = field + row[r];
+    MpmVec along = w->value[0][1] * node[0];
 #pragma GCC unroll 3
-    for (int a = 0; a < width; a++) along += w->value[a][1] * field[row[r] + a];
-    value += mpm_across(w->value, w->value, r, dimension, width) * along;
+    for (int a = 1; a < width; a++) along += w->value[a][1] * node[a];
+    along *= mpm_across(w->value, w->value, r, dimension, width);
+    value = r == 0 ? along : value + along;
   }
   return value;
 }
@@ -82,19 +95,18 @@ MPM_INLINE MpmVec mpm_gather_value(const MpmVec *field, const int *row, const Mp
 /* gradient[j] = sum over nodes of field times slope along axis j, values along the others; `slope` per unit of u. */
 MPM_INLINE void mpm_gather_gradient(const MpmVec *field, const int *row, const MpmWeights *w, const MpmVec *slope,
                                     int dimension, int width, MpmVec gradient[3]) {
-  for (int j = 0; j < 3; j++) gradient[j] = (MpmVec){0.0, 0.0, 0.0, 0.0};
   const int rows = dimension == 3 ? width * width : width;
 #pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {
-    MpmVec along = {0.0, 0.0, 0.0, 0.0}, across = {0.0, 0.0, 0.0, 0.0};
+    const MpmVec *node = field + row[r];
+    MpmVec along = w->value[0][1] * node[0], across = slope[0][1] * node[0];
 #pragma GCC unroll 3
-    for (int a = 0; a < width; a++) {
-      along += w->value[a][1] * field[row[r] + a];
-      across += slope[a][1] * field[row[r] + a];
-    }
-    gradient[0] += mpm_across(w->value, w->value, r, dimension, width) * across;
-    gradient[1] += mpm_across(slope, w->value, r, dimension, width) * along;
-    if (dimension == 3) gradient[2] += mpm_across(w->value, slope, r, dimension, width) * along;
+    for (int a = 1; a < width; a++) along += w->value[a][1] * node[a], across += slope[a][1] * node[a];
+    const MpmVec term[3] = {mpm_across(w->value, w->value, r, dimension, width) * across,
+                            mpm_across(slope, w->value, r, dimension, width) * along,
+                            mpm_across(w->value, slope, r, dimension, width) * along};
+#pragma GCC unroll 3
+    for (int j = 0; j < dimension; j++) gradient[j] = r == 0 ? term[j] : gradient[j] + term[j];
   }
 }
 

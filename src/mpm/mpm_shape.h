@@ -25,6 +25,10 @@ typedef double MpmVec __attribute__((vector_size(32)));
 typedef long long MpmMask __attribute__((vector_size(32)));
 
 MPM_INLINE MpmVec mpm_vec_all(double x) { return (MpmVec){x, x, x, x}; }
+/* The axes' lanes alone. */
+MPM_INLINE int mpm_axes_all(MpmMask mask, int dimension) {
+  return (mask[1] & mask[2] & (dimension == 3 ? mask[3] : -1)) != 0;
+}
 MPM_INLINE int mpm_mask_all(MpmMask mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
 /* Four rows of an array, of which `n` (1 to 4) exist: the others repeat the last one and are not written. */
 MPM_INLINE MpmVec mpm_vec_load(const double *row, int n) {
@@ -37,6 +41,10 @@ MPM_INLINE void mpm_vec_store(MpmVec x, double *row, int n) {
   if (n < 4)
     for (int i = 0; i < n; i++) row[i] = x[i];
   else __builtin_memcpy(row, &x, sizeof x);
+}
+/* a where the mask is set, else b. */
+MPM_INLINE MpmVec mpm_vec_select(MpmMask mask, MpmVec a, MpmVec b) {
+  return (MpmVec)(((MpmMask)a & mask) | ((MpmMask)b & ~mask));
 }
 /* x where x > 0, else 0. */
 MPM_INLINE MpmVec mpm_vec_positive(MpmVec x) { return (MpmVec)((MpmMask)x & (x > 0.0)); }
