@@ -68,6 +68,7 @@ typedef struct MpmPoints {
   MpmVec *old_position;
   MpmVec *motion;     /* {1, velocity} */
   MpmVec *half;       /* half edges of the uGIMP domain over h; lanes without meaning are 1/2. NULL: not uGIMP */
+  int equal_domains;  /* half is the same for all rows */
   MpmVec *force;      /* {0, external force} */
   double *volume0;    /* own rows, as the following */
   double *deformation_gradient[9], *velocity_gradient[9], *stress[6];
@@ -196,7 +197,12 @@ struct Mpm {
 };
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define MPM_CLONES __attribute__((target_clones("avx2", "default"))) /* same bits: no contraction */
+/* Same bits: no contraction. AVX-512 (v4) for its 32 registers; older compilers do not know the name. */
+#if __GNUC__ >= 12
+#define MPM_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#else
+#define MPM_CLONES __attribute__((target_clones("avx2", "default")))
+#endif
 #else
 #define MPM_CLONES
 #endif

@@ -28,12 +28,14 @@ typedef struct MpmWeights {
 /* What all rows of a cell share. */
 typedef struct MpmCellBase {
   MpmVec origin, base;
+  MpmVec half, inverse; /* uGIMP, where all domains are equal: half edges over h, and over them 1/2 */
 } MpmCellBase;
 
 MPM_INLINE MpmCellBase mpm_cell_base(const Mpm *mpm, int cell, int dimension) {
   const double *o = mpm->scene.origin;
   const uint64_t key = mpm->grid.cell_key[cell];
-  MpmCellBase result = {{0.0, o[0], o[1], o[2]}, {0.0, 0.0, 0.0, 0.0}};
+  MpmCellBase result = {{0.0, o[0], o[1], o[2]}, {0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+  if (mpm->points.equal_domains) result.half = mpm->points.half[0], result.inverse = 0.5 / result.half;
   for (int i = 0; i < dimension; i++)
     result.base[1 + i] = (double)((int)(key >> (i * MPM_KEY_BITS) & MPM_KEY_MASK) - MPM_KEY_BIAS);
   return result;
@@ -41,8 +43,10 @@ MPM_INLINE MpmCellBase mpm_cell_base(const Mpm *mpm, int cell, int dimension) {
 
 MPM_INLINE void mpm_find_weights(const Mpm *mpm, int k, const MpmCellBase *cell, MpmShape shape, MpmWeights *w) {
   const MpmPoints *p = &mpm->points;
+  MpmVec half = cell->half, inverse = cell->inverse;
+  if (shape == MPM_SHAPE_GIMP && !p->equal_domains) half = p->half[k], inverse = 0.5 / half;
   w->f = (p->place[k] - cell->origin) * mpm->per_length - cell->base;
-  mpm_shape_axes(shape, w->f, shape == MPM_SHAPE_GIMP ? p->half[k] : mpm_vec_all(0.5), w->value, w->slope);
+  mpm_shape_axes(shape, w->f, half, inverse, w->value, w->slope);
 }
 
 /* What is floored to find the cell, over h. */

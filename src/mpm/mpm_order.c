@@ -250,35 +250,38 @@ MPM_INLINE void copy_row(char *rows, size_t width, int to, const char *other, in
   }
 }
 
+MPM_INLINE MpmRegion clip(MpmRegion region, int low, int high) {
+  return (MpmRegion){region.first > low ? region.first : low, region.end < high ? region.end : high, region.down};
+}
+
 /* Rows keep their order, so that none overwrites what another still needs if those that go down are moved upwards and
  * then those that go up downwards. */
 MPM_INLINE void move_part(const MpmPoints *p, const MpmPlane *plane, size_t width, int low, int high) {
   char *rows;
   memcpy(&rows, plane->rows, sizeof rows);
+  const int *const source = p->source;
   for (int n = 0; n < p->regions; n++) {
-    const MpmRegion *r = &p->region[n];
-    for (int k = r->first > low ? r->first : low; r->down && k < r->end && k < high; k++)
-      copy_row(rows, width, k, rows, p->source[k]);
+    const MpmRegion r = clip(p->region[n], low, high);
+    for (int k = r.first; r.down && k < r.end; k++) copy_row(rows, width, k, rows, source[k]);
   }
   for (int n = p->regions - 1; n >= 0; n--) {
-    const MpmRegion *r = &p->region[n];
-    for (int k = (r->end < high ? r->end : high) - 1; !r->down && k >= r->first && k >= low; k--)
-      copy_row(rows, width, k, rows, p->source[k]);
+    const MpmRegion r = clip(p->region[n], low, high);
+    for (int k = r.end - 1; !r.down && k >= r.first; k--) copy_row(rows, width, k, rows, source[k]);
   }
 }
 
 MPM_INLINE void fetch_part(const MpmPoints *p, const MpmPlane *plane, size_t width, int first, int end) {
   char *rows, *spare = plane->spare;
+  const MpmFetch *const fetch = p->fetch;
   memcpy(&rows, plane->rows, sizeof rows);
-  for (int n = first; n < end; n++)
-    copy_row(spare, width, n, rows, p->fetch[n].from);
+  for (int n = first; n < end; n++) copy_row(spare, width, n, rows, fetch[n].from);
 }
 
 MPM_INLINE void put_part(const MpmPoints *p, const MpmPlane *plane, size_t width, int first, int end) {
   char *rows, *spare = plane->spare;
+  const MpmFetch *const fetch = p->fetch;
   memcpy(&rows, plane->rows, sizeof rows);
-  for (int n = first; n < end; n++)
-    copy_row(rows, width, p->fetch[n].to, spare, n);
+  for (int n = first; n < end; n++) copy_row(rows, width, fetch[n].to, spare, n);
 }
 
 /* Calls body(p, plane, width, first, end); the usual widths are constants. */

@@ -222,6 +222,8 @@ MPM_INLINE void prefetch_point(const MpmPoints *p, int k) {
   for (size_t line = 0; line < sizeof(MpmPoint); line += 64) __builtin_prefetch(next + line);
 }
 
+static int is_equal(MpmVec a, MpmVec b) { return mpm_mask_all(a == b); }
+
 /* 1 if the rows hold these points in this order already. */
 static int is_known(const MpmPoints *p, const MpmPoint *points, int count) {
   if (!p->has_order || count != p->own) return 0;
@@ -278,6 +280,8 @@ BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count) {
     prefetch_point(p, k);
     load_own(mpm, k, &points[p->slot[k]]);
   }
+  p->equal_domains = count > 0 && p->half && !mpm->scene.gimp_stretch;
+  for (int k = 1; k < count && p->equal_domains; k++) p->equal_domains = is_equal(p->half[k], p->half[0]);
   double low = INFINITY, high = 0.0;
   for (int k = 0; k < count; k++) low = fmin(low, p->position[k][0]), high = fmax(high, p->position[k][0]);
   p->mass_low = low, p->mass_high = high;
@@ -303,6 +307,7 @@ void mpm_points_load_foreign(Mpm *mpm, const MpmPoint *foreign) {
     p->foreign_slot[s] = p->item[s].index;
     p->key[k] = p->item[s].cell;
     load_common(mpm, k, point);
+    p->equal_domains = p->equal_domains && is_equal(p->half[k], p->half[0]);
     p->force[k] = vector_of(3, 0.0, none);
     if (p->old_position) p->old_position[k] = p->position[k]; /* nobody here moves them */
     p->mass_low = fmin(p->mass_low, point->mass), p->mass_high = fmax(p->mass_high, point->mass);

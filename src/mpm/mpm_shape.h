@@ -52,8 +52,8 @@ MPM_INLINE MpmVec mpm_vec_positive(MpmVec x) { return (MpmVec)((MpmMask)x & (x >
 /* value[a] = S at node base + a, slope[a] = dS/du, axis by axis. uGIMP: mean of the hat function over [f - half, f +
  * half], half <= 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity.
  */
-MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec value[MPM_WIDTH_MAX],
-                               MpmVec slope[MPM_WIDTH_MAX]) {
+MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec inverse /* of 2 half */,
+                               MpmVec value[MPM_WIDTH_MAX], MpmVec slope[MPM_WIDTH_MAX]) {
   if (shape == MPM_SHAPE_LINEAR) {
     value[0] = 1.0 - f, value[1] = f;
     slope[0] = mpm_vec_all(-1.0), slope[1] = mpm_vec_all(1.0);
@@ -67,7 +67,6 @@ MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec val
     const MpmVec left = 1.0 - (f - half);                        /* from the domain's left end to node 1 */
     const MpmVec rest = mpm_vec_positive(left - 2.0 * half);     /* of it not covered by the domain */
     const MpmVec right = mpm_vec_positive(2.0 * half - left);    /* of the domain beyond node 1 */
-    const MpmVec inverse = 0.5 / half;
     value[0] = 0.5 * inverse * (left - rest) * (left + rest), value[2] = 0.5 * inverse * right * right;
     slope[0] = -inverse * (left - rest), slope[2] = inverse * right;
     value[1] = 1.0 - value[0] - value[2];
@@ -79,7 +78,7 @@ MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec val
 MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double value[MPM_WIDTH_MAX],
                                double slope[MPM_WIDTH_MAX]) {
   MpmVec values[MPM_WIDTH_MAX], slopes[MPM_WIDTH_MAX];
-  mpm_shape_axes(shape, mpm_vec_all(f), mpm_vec_all(half), values, slopes);
+  mpm_shape_axes(shape, mpm_vec_all(f), mpm_vec_all(half), mpm_vec_all(0.5 / half), values, slopes);
   for (int a = 0; a < mpm_shape_width(shape); a++) value[a] = values[a][0], slope[a] = slopes[a][0];
 }
 
