@@ -155,7 +155,8 @@ MPM_INLINE void update_body(Mpm *mpm, int first, int end, int is_flip, int dimen
       if (!is_flip && scene->transfer == MPM_TRANSFER_APIC) update_affine(mpm, k, row, &w, dimension, shape);
       const MpmVec position = p->position[k], sum = position + p->motion[k];
       fault += sum - sum; /* 0, or NaN */
-      stay &= mpm_is_in_cell(mpm, shape, position, shape != MPM_SHAPE_GIMP || p->equal_domains ? base.half : p->half[k], &base);
+      const MpmVec half = shape != MPM_SHAPE_GIMP || p->equal_domains ? base.half : p->half[k];
+      stay &= mpm_is_in_cell(mpm, shape, position, half, &base);
     }
     if (!mpm_axes_all(stay, dimension)) mpm_mark_cell(mpm, cell);
   }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The order of own points by (cell, tag), from step to step. Few points change their cell in a step: only those are sorted,
- * and rows move only in such steps, in place. */
+/* The order of own points by (cell, tag), from step to step. Few points change their cell in a step: only those are
+ * sorted, and rows move only in such steps, in place. */
 #include <math.h>
 #include <string.h>
 
@@ -215,8 +215,8 @@ static BaseStatus find_places(Mpm *mpm, int movers) {
 
 /* ------------------------------------------------------------------------------------------------------ moving */
 
-/* A part of the rows is filled by one thread. What comes from other parts is fetched, as rows that cross others are, before
- * anything moves. */
+/* A part of the rows is filled by one thread. What comes from other parts is fetched, as rows that cross others are,
+ * before anything moves. */
 static int part_first(const MpmPoints *p, int part, int parts) { return (int)((int64_t)p->own * part / parts); }
 
 static void fetch_row(MpmPoints *p, int row) {

@@ -39,8 +39,8 @@ static void list_planes(Mpm *mpm) {
     ADD_PLANE(p, stress[n], dimension == 2 && n > 3 && mpm_law_is_local(mpm) ? PLANE_CONSTANT : PLANE_MOVES);
 }
 
-/* All planes in one block. Loops read a dozen arrays at the same row: if these began at the same place of a page, as large
- * blocks from malloc do, their rows would compete for the same few lines of the first-level cache. */
+/* All planes in one block. Loops read a dozen arrays at the same row: if these began at the same place of a page, as
+ * large blocks from malloc do, their rows would compete for the same few lines of the first-level cache. */
 static BaseStatus grow_planes(MpmPoints *p, size_t room) {
   enum { LINE = 64, PAGE = 4096, APART = 13 * LINE };
   size_t bytes = 0, offset[MPM_PLANES_MAX];
