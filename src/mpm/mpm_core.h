@@ -21,17 +21,26 @@ typedef struct MpmItem {
   int index; /* of whatever is sorted: slot, row, foreign point */
 } MpmItem;
 
-/* An array whose rows move when points change their order; spare: memory of the same size. */
+/* An array of rows. */
 typedef struct MpmPlane {
-  void **rows, **spare;
+  void **rows;
+  void *spare;  /* of the same size, if the rows move */
   size_t width; /* bytes per row */
+  int moves;       /* its rows move when points change their order */
+  int is_constant; /* no step changes it: if all rows are equal they need not move */
+  int is_uniform;  /* they are */
 } MpmPlane;
-enum { MPM_PLANES_MAX = 32 };
+enum { MPM_PLANES_MAX = 40 };
 
-/* Rows `from`, from + 1 ... become rows `to`, to + 1 ... */
-typedef struct MpmStretch {
-  int to, from, count;
-} MpmStretch;
+/* Row `from` becomes row `to`. */
+typedef struct MpmFetch {
+  int to, from;
+} MpmFetch;
+
+/* New rows first .. end, whose old places are all further up (down = 1) or further down. */
+typedef struct MpmRegion {
+  int first, end, down;
+} MpmRegion;
 
 /* The core's own state. Rows: own points by (cell, tag), then foreign ones by (cell, tag); they move only when points
  * change their cells. What only heat, tractions and output need stays in the attached array ("home"), where the point
@@ -49,7 +58,8 @@ typedef struct MpmPoints {
   double mass_low, mass_high; /* of own and foreign points */
   MpmPlane plane[MPM_PLANES_MAX];
   int planes;
-  void *spare[MPM_PLANES_MAX];
+  void *block;        /* memory of all planes */
+  int uniform_known;  /* is_uniform of the planes is up to date */
   int *slot;          /* own rows */
   uint64_t *key;      /* cell */
   int64_t *tag;
@@ -58,6 +68,7 @@ typedef struct MpmPoints {
   MpmVec *old_position;
   MpmVec *motion;     /* {1, velocity} */
   MpmVec *half;       /* half edges of the uGIMP domain over h; lanes without meaning are 1/2. NULL: not uGIMP */
+  int equal_domains;  /* half is the same for all rows */
   MpmVec *force;      /* {0, external force} */
   double *volume0;    /* own rows, as the following */
   double *deformation_gradient[9], *velocity_gradient[9], *stress[6];
@@ -68,10 +79,12 @@ typedef struct MpmPoints {
   MpmVec *gathered;    /* XPIC: {1, intermediate velocity} */
   double *carry;       /* slot: scratch for halo->forward */
   unsigned char *moves; /* own rows: leaves its cell */
+  int movers_known;     /* `moves` is up to date: G2P has found who leaves */
   int *mover;           /* rows that leave */
-  int *target;          /* their new rows, in the order of item */
-  MpmStretch *stretch;  /* [stretches] of the other rows, upwards */
-  int stretches;
+  int *source;          /* new row -> old one, in `region`; rows that are fetched: themselves */
+  MpmRegion *region;    /* [regions] upwards */
+  MpmFetch *fetch;      /* rows that cross others, by new row */
+  int regions, fetches;
   int *foreign_slot;    /* foreign row - own -> the halo's order */
   MpmItem *item, *spare_item;
   /* Of laws without `advance`: slot, own points. */
@@ -86,8 +99,9 @@ typedef struct MpmPoints {
 typedef struct MpmGrid {
   int cells, nodes, cell_room, node_room;
   int is_current;      /* for the present order of points */
-  uint64_t *cell_key;
-  int *cell_first;     /* [cells + 1] own rows */
+  int has_changed;     /* other cells than those that the nodes were built for */
+  uint64_t *cell_key, *next_key;
+  int *cell_first, *next_first; /* [cells + 1] own rows */
   /* With foreign points: the rows of a cell in the order of tags, as stretches of rows [first, end). */
   int runs, run_room;
   int *run_first;      /* [cells + 1] */
@@ -97,6 +111,7 @@ typedef struct MpmGrid {
   int has_index, (*index)[3]; /* [nodes], if has_index */
   /* Slabs of MPM_SLAB layers of cells of the outermost axis, by global index; slabs of one colour share no node. */
   int slabs[2], *slab[2]; /* [slabs][2] first cell, end */
+  double uniform_scale;   /* kg, of all nodes, or 0 */
   MpmVec *sum;         /* {mass, momentum}, kg and N s */
   double (*heat)[2];   /* {C_I, sum m c T}, J/K and J */
   double *scale;       /* largest mass of a point whose support holds the node, kg */
@@ -114,6 +129,15 @@ typedef struct MpmGrid {
   int *position[3][MPM_WIDTH_MAX];
   int dilated_room[2], position_room[3];
 } MpmGrid;
+
+/* Work of a pass is shared out in pieces: slabs of either colour or chunks of cells. Every thread has the same part of
+ * the rows in all passes, which stay in its cache; who is ready first takes from the others' pieces. */
+enum { MPM_SHARE_EVEN, MPM_SHARE_ODD, MPM_SHARE_CHUNKS, MPM_SHARES, MPM_CHUNK = 128 /* cells */ };
+typedef struct MpmQueue {
+  int first, end; /* pieces of one thread */
+  int next;
+  char apart[52]; /* each in its own line of the cache */
+} MpmQueue;
 
 /* A node under a wall's condition. */
 typedef struct MpmContact {
@@ -155,6 +179,7 @@ struct Mpm {
   double spacing[3];  /* m, present edges of a cell: the scene's times what mpm_set_stretch() said */
   MpmVec per_length;  /* lane 1 + i: 1 / spacing[i]; lane 0: 1 / the scene's spacing */
   int threads; /* OpenMP threads of a pass */
+  MpmQueue *queue; /* [MPM_SHARES][threads] */
   double dt;
   double heat_duration; /* s, of mpm_set_heat_duration() */
   int heats;            /* this step finds rates of temperature */
@@ -174,7 +199,12 @@ struct Mpm {
 };
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define MPM_CLONES __attribute__((target_clones("avx2", "default"))) /* same bits: no contraction */
+/* Same bits: no contraction. AVX-512 (v4) for its 32 registers; older compilers do not know the name. */
+#if __GNUC__ >= 12
+#define MPM_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#else
+#define MPM_CLONES __attribute__((target_clones("avx2", "default")))
+#endif
 #else
 #define MPM_CLONES
 #endif
@@ -228,11 +258,21 @@ const char *mpm_find_fault(const Mpm *mpm, const MpmPoint *point, BaseStatus *st
 /* mpm_sort.c */
 void mpm_sort_items(MpmItem **item, MpmItem **spare, int n); /* by (cell, tag); the two may change places */
 uint64_t mpm_find_cell(Mpm *mpm, MpmVec position, MpmVec half, int64_t tag); /* 0, and a note, if it is too far away */
+
+/* mpm_order.c */
 /* Moves the rows of own points that have left their cells; checks that all are finite. */
 BaseStatus mpm_points_order(Mpm *mpm);
+void mpm_mark_cell(Mpm *mpm, int cell);      /* sets `moves` of its rows */
+void mpm_points_forget_movers(Mpm *mpm);     /* positions or the grid were changed since G2P marked them */
+
+/* mpm_share.c */
+void mpm_share_set(Mpm *mpm);                /* who has which pieces, by rows */
+void mpm_share_start(Mpm *mpm);              /* before the threads of a pass start */
+int mpm_share_next(Mpm *mpm, int kind);      /* a piece for this thread; -1: none is left */
 
 /* mpm_grid.c */
 BaseStatus mpm_grid_build(Mpm *mpm); /* cells, slabs, nodes from the rows */
+BaseStatus mpm_grid_reserve_cells(MpmGrid *grid, int cells);
 void mpm_grid_find_index(Mpm *mpm);
 void mpm_grid_free(MpmGrid *grid);
 

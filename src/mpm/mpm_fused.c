@@ -25,14 +25,16 @@ static void stress_cells(Mpm *mpm, const int range[2], int with_load) {
 
 void mpm_stress(Mpm *mpm, int with_load) {
   MpmGrid *grid = &mpm->grid;
+  mpm_share_start(mpm);
 #pragma omp parallel num_threads(mpm->threads) if (mpm_is_parallel(mpm))
   {
     if (with_load) {
 #pragma omp for
       for (int n = 0; n < grid->nodes; n++) grid->rate[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
     }
-    for (int colour = 0; colour < 2; colour++)
-#pragma omp for schedule(dynamic, 1)
-      for (int s = 0; s < grid->slabs[colour]; s++) stress_cells(mpm, grid->slab[colour] + 2 * s, with_load);
+    for (int colour = 0; colour < 2; colour++) {
+      for (int s; (s = mpm_share_next(mpm, colour)) >= 0;) stress_cells(mpm, grid->slab[colour] + 2 * s, with_load);
+#pragma omp barrier
+    }
   }
 }

@@ -6,15 +6,14 @@
 #include "mpm_kernel.h"
 
 /* Cells in chunks, for threads. */
-enum { CHUNK = 128 };
-static int chunks(const Mpm *mpm) { return (mpm->grid.cells + CHUNK - 1) / CHUNK; }
 static int chunk_end(const Mpm *mpm, int chunk) {
-  return (chunk + 1) * CHUNK < mpm->grid.cells ? (chunk + 1) * CHUNK : mpm->grid.cells;
+  return (chunk + 1) * MPM_CHUNK < mpm->grid.cells ? (chunk + 1) * MPM_CHUNK : mpm->grid.cells;
 }
 #define FOR_CHUNKS(mpm, call)                                                                                    \
-  _Pragma("omp parallel for schedule(dynamic, 4) num_threads((mpm)->threads) if (mpm_is_parallel(mpm))")         \
-  for (int q = 0; q < chunks(mpm); q++) {                                                                        \
-    const int first = q * CHUNK, end = chunk_end(mpm, q);                                                        \
+  mpm_share_start(mpm);                                                                                          \
+  _Pragma("omp parallel num_threads((mpm)->threads) if (mpm_is_parallel(mpm))")                                  \
+  for (int q; (q = mpm_share_next(mpm, MPM_SHARE_CHUNKS)) >= 0;) {                                               \
+    const int first = q * MPM_CHUNK, end = chunk_end(mpm, q);                                                    \
     call;                                                                                                        \
   }
 
@@ -82,6 +81,7 @@ MPM_INLINE void update_motion(Mpm *mpm, int k, MpmVec sv, MpmVec sa, MpmVec exte
   const MpmScene *scene = &mpm->scene;
   MpmPoints *p = &mpm->points;
   const double dt = mpm->dt;
+  const MpmMask axes = {0, -1, -1, -1};
   const MpmVec old = p->motion[k], place = p->position[k];
   const MpmVec damping = dt * (scene->point_damping * old + scene->grid_damping * sv);
   MpmVec velocity, position;
@@ -90,8 +90,7 @@ MPM_INLINE void update_motion(Mpm *mpm, int k, MpmVec sv, MpmVec sa, MpmVec exte
   else velocity = extended + dt * sa - damping;
   if (scene->transfer == MPM_TRANSFER_APIC) position = place + dt * (sv + dt * sa);
   else position = place + (dt * sv + 0.5 * dt * (velocity - old));
-  velocity[0] = 1.0, position[0] = place[0];
-  p->motion[k] = velocity, p->position[k] = position;
+  p->motion[k] = mpm_vec_select(axes, velocity, old), p->position[k] = mpm_vec_select(axes, position, place);
   if (p->old_position) p->old_position[k] = place;
 }
 
@@ -146,6 +145,7 @@ MPM_INLINE void update_body(Mpm *mpm, int first, int end, int is_flip, int dimen
   for (int cell = first; cell < end; cell++) {
     const int *row = grid->cell_row[cell];
     const MpmCellBase base = mpm_cell_base(mpm, cell, dimension);
+    MpmMask stay = {-1, -1, -1, -1};
     for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++) {
       MpmWeights w;
       MpmVec extended = {0.0, 0.0, 0.0, 0.0};
@@ -158,9 +158,12 @@ MPM_INLINE void update_body(Mpm *mpm, int first, int end, int is_flip, int dimen
         extended = mpm_gather_value(grid->extended, row, &w, dimension, width);
       update_motion(mpm, k, value, rate, extended);
       if (!is_flip && scene->transfer == MPM_TRANSFER_APIC) update_affine(mpm, k, row, &w, dimension, shape);
-      const MpmVec sum = p->position[k] + p->motion[k];
+      const MpmVec position = p->position[k], sum = position + p->motion[k];
       fault += sum - sum; /* 0, or NaN */
+      const MpmVec half = shape != MPM_SHAPE_GIMP || p->equal_domains ? base.half : p->half[k];
+      stay &= mpm_is_in_cell(mpm, shape, position, half, &base);
     }
+    if (!mpm_axes_all(stay, dimension)) mpm_mark_cell(mpm, cell);
   }
   if (!(fault[0] + fault[1] + fault[2] + fault[3] == 0.0))
     note_faults(mpm, grid->cell_first[first], grid->cell_first[end]);
@@ -181,4 +184,5 @@ void mpm_g2p_update(Mpm *mpm) {
   } else {
     FOR_CHUNKS(mpm, update_any(mpm, first, end))
   }
+  mpm->points.movers_known = 1;
 }

@@ -7,14 +7,16 @@
 
 enum { MPM_SLAB = 2 /* layers of cells; >= support width - 1, so that slabs of one colour share no node */ };
 
-static BaseStatus reserve_cells(MpmGrid *grid, int cells) {
+BaseStatus mpm_grid_reserve_cells(MpmGrid *grid, int cells) {
   if (cells <= grid->cell_room && grid->cell_room > 0) return BASE_OK; /* without points the end mark needs room, too */
   const size_t room = (size_t)cells + (size_t)cells / 4 + 16, kept = (size_t)grid->cell_room;
   TRY(BASE_GROW(kept, room + 1, &grid->cell_key));
-  TRY(BASE_GROW(kept, room + 1, &grid->cell_first));
+  TRY(BASE_GROW(kept + 1, room + 1, &grid->cell_first));
+  TRY(BASE_GROW(0, room + 1, &grid->next_key));
+  TRY(BASE_GROW(0, room + 1, &grid->next_first));
   TRY(BASE_GROW(kept, room, &grid->cell_row));
   TRY(BASE_GROW(kept, room + 1, &grid->run_first));
-  for (int colour = 0; colour < 2; colour++) TRY(BASE_GROW(0, 2 * room, &grid->slab[colour]));
+  for (int colour = 0; colour < 2; colour++) TRY(BASE_GROW(2 * kept, 2 * room, &grid->slab[colour]));
   grid->cell_room = (int)room;
   return BASE_OK;
 }
@@ -47,7 +49,8 @@ void mpm_grid_free(MpmGrid *grid) {
       grid->cell_key, grid->cell_first, grid->cell_row,   grid->index,      grid->slab[0],       grid->slab[1],
       grid->sum,      grid->heat,       grid->scale,      grid->lowest_tag, grid->state,         grid->rate,
       grid->extended, grid->term,       grid->contact_of, grid->view_mass,  grid->view_velocity, grid->view_temperature,
-      grid->owned,    grid->dilated[0], grid->dilated[1], grid->run,        grid->run_first};
+      grid->owned,    grid->dilated[0], grid->dilated[1], grid->run,        grid->run_first,     grid->next_key,
+      grid->next_first};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   for (int axis = 0; axis < 3; axis++)
     for (int w = 0; w < MPM_WIDTH_MAX; w++) base_free(grid->position[axis][w]);
@@ -165,29 +168,28 @@ static int cell_end(const MpmPoints *p, int row, int end, uint64_t key) {
   return k;
 }
 
-/* Cells of own and foreign points. *changed: other cells than before. */
-static BaseStatus list_cells(Mpm *mpm, int *changed) {
+/* Cells of own and foreign points. */
+static BaseStatus list_cells(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
   const MpmPoints *p = &mpm->points;
   const int own_end = p->count ? p->own : 0, end = p->count;
   int cells = 0, own = 0, foreign = own_end;
   grid->runs = 0;
-  *changed = 0;
   while (own < own_end || foreign < end) {
     const int own_first = foreign == end || (own < own_end && p->key[own] <= p->key[foreign]);
     const uint64_t key = p->key[own_first ? own : foreign];
-    if (cells == grid->cell_room) TRY(reserve_cells(grid, cells + 1));
+    if (cells == grid->cell_room) TRY(mpm_grid_reserve_cells(grid, cells + 1));
     const int own_range[2] = {own, cell_end(p, own, own_end, key)};
     const int foreign_range[2] = {foreign, cell_end(p, foreign, end, key)};
-    *changed |= cells >= grid->cells || grid->cell_key[cells] != key;
+    grid->has_changed |= cells >= grid->cells || grid->cell_key[cells] != key;
     grid->cell_key[cells] = key;
     grid->cell_first[cells] = own;
     grid->run_first[cells++] = grid->runs;
     if (p->foreign > 0) TRY(add_runs(grid, p, own_range, foreign_range));
     own = own_range[1], foreign = foreign_range[1];
   }
-  TRY(reserve_cells(grid, cells));
-  *changed |= cells != grid->cells;
+  TRY(mpm_grid_reserve_cells(grid, cells));
+  grid->has_changed |= cells != grid->cells;
   grid->cells = cells;
   grid->cell_first[cells] = own;
   grid->run_first[cells] = grid->runs;
@@ -205,7 +207,7 @@ static double largest_mass(const MpmGrid *grid, const MpmPoints *p, int cell) {
   double mass = 0.0;
   for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++)
     mass = p->position[k][0] > mass ? p->position[k][0] : mass;
-  for (int r = grid->run_first[cell]; r < grid->run_first[cell + 1]; r++)
+  for (int r = grid->run_first[cell]; p->foreign > 0 && r < grid->run_first[cell + 1]; r++)
     for (int k = grid->run[r][0]; k < grid->run[r][1]; k++) mass = p->position[k][0] > mass ? p->position[k][0] : mass;
   return mass;
 }
@@ -216,6 +218,9 @@ static void describe_nodes(Mpm *mpm) {
   const MpmPoints *p = &mpm->points;
   const int width = mpm_width(mpm), rows = mpm->scene.dimension == 3 ? width * width : width;
   const int with_mass = p->mass_low != p->mass_high, with_owner = p->foreign > 0;
+  const double uniform = with_mass || with_owner ? 0.0 : p->mass_low;
+  if (!grid->has_changed && uniform > 0.0 && grid->uniform_scale == uniform) return;
+  grid->uniform_scale = uniform;
   for (int n = 0; n < grid->nodes; n++) {
     grid->scale[n] = with_mass ? 0.0 : p->mass_low;
     grid->owned[n] = 1;
@@ -239,16 +244,18 @@ static void describe_nodes(Mpm *mpm) {
 BaseStatus mpm_grid_build(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
   if (grid->is_current && !mpm->points.has_moved && !mpm->halo) return BASE_OK;
-  int changed;
-  const int was_current = grid->is_current;
+  const int is_listed = grid->is_current && !mpm->halo; /* by mpm_points_order() */
+  grid->has_changed |= !grid->is_current;
   grid->is_current = 0; /* no half-built grid that looks current */
-  TRY(list_cells(mpm, &changed));
-  if (changed || !was_current) {
+  if (!is_listed) TRY(list_cells(mpm));
+  if (grid->has_changed) {
     TRY(build_nodes(mpm));
     build_slabs(mpm);
   }
   describe_nodes(mpm);
+  mpm_share_set(mpm);
   grid->is_current = 1;
+  grid->has_changed = 0;
   mpm->points.has_moved = 0;
   return BASE_OK;
 }

@@ -28,12 +28,14 @@ typedef struct MpmWeights {
 /* What all rows of a cell share. */
 typedef struct MpmCellBase {
   MpmVec origin, base;
+  MpmVec half, inverse; /* uGIMP, where all domains are equal: half edges over h, and over them 1/2 */
 } MpmCellBase;
 
 MPM_INLINE MpmCellBase mpm_cell_base(const Mpm *mpm, int cell, int dimension) {
   const double *o = mpm->scene.origin;
   const uint64_t key = mpm->grid.cell_key[cell];
-  MpmCellBase result = {{0.0, o[0], o[1], o[2]}, {0.0, 0.0, 0.0, 0.0}};
+  MpmCellBase result = {{0.0, o[0], o[1], o[2]}, {0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+  if (mpm->points.equal_domains) result.half = mpm->points.half[0], result.inverse = 0.5 / result.half;
   for (int i = 0; i < dimension; i++)
     result.base[1 + i] = (double)((int)(key >> (i * MPM_KEY_BITS) & MPM_KEY_MASK) - MPM_KEY_BIAS);
   return result;
@@ -41,8 +43,21 @@ MPM_INLINE MpmCellBase mpm_cell_base(const Mpm *mpm, int cell, int dimension) {
 
 MPM_INLINE void mpm_find_weights(const Mpm *mpm, int k, const MpmCellBase *cell, MpmShape shape, MpmWeights *w) {
   const MpmPoints *p = &mpm->points;
+  MpmVec half = cell->half, inverse = cell->inverse;
+  if (shape == MPM_SHAPE_GIMP && !p->equal_domains) half = p->half[k], inverse = 0.5 / half;
   w->f = (p->place[k] - cell->origin) * mpm->per_length - cell->base;
-  mpm_shape_axes(shape, w->f, shape == MPM_SHAPE_GIMP ? p->half[k] : mpm_vec_all(0.5), w->value, w->slope);
+  mpm_shape_axes(shape, w->f, half, inverse, w->value, w->slope);
+}
+
+/* What is floored to find the cell, over h. */
+MPM_INLINE MpmVec mpm_anchor(const Mpm *mpm, MpmShape shape, MpmVec origin, MpmVec position, MpmVec half) {
+  const MpmVec u = (position - origin) * mpm->per_length;
+  return shape == MPM_SHAPE_LINEAR ? u : shape == MPM_SHAPE_BSPLINE ? u - 0.5 : u - half;
+}
+/* Lanes of axes along which a point is still in the cell. */
+MPM_INLINE MpmMask mpm_is_in_cell(const Mpm *mpm, MpmShape shape, MpmVec position, MpmVec half, const MpmCellBase *cell) {
+  const MpmVec anchor = mpm_anchor(mpm, shape, cell->origin, position, half);
+  return (anchor >= cell->base) & (anchor < cell->base + 1.0);
 }
 
 /* Rows of a cell in the order of tags: `count` stretches. */
@@ -67,14 +82,16 @@ MPM_INLINE double mpm_across(const MpmVec *y, const MpmVec *z, int r, int dimens
 }
 
 MPM_INLINE MpmVec mpm_gather_value(const MpmVec *field, const int *row, const MpmWeights *w, int dimension, int width) {
-  MpmVec value = {0.0, 0.0, 0.0, 0.0};
+  MpmVec value = mpm_vec_all(0.0); /* sums begin with their first term: the compiler must not drop 0.0 + x */
   const int rows = dimension == 3 ? width * width : width;
 #pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {
-    MpmVec along = {0.0, 0.0, 0.0, 0.0};
+    const MpmVec *node = field + row[r];
+    MpmVec along = w->value[0][1] * node[0];
 #pragma GCC unroll 3
-    for (int a = 0; a < width; a++) along += w->value[a][1] * field[row[r] + a];
-    value += mpm_across(w->value, w->value, r, dimension, width) * along;
+    for (int a = 1; a < width; a++) along += w->value[a][1] * node[a];
+    along *= mpm_across(w->value, w->value, r, dimension, width);
+    value = r == 0 ? along : value + along;
   }
   return value;
 }
@@ -82,19 +99,18 @@ MPM_INLINE MpmVec mpm_gather_value(const MpmVec *field, const int *row, const Mp
 /* gradient[j] = sum over nodes of field times slope along axis j, values along the others; `slope` per unit of u. */
 MPM_INLINE void mpm_gather_gradient(const MpmVec *field, const int *row, const MpmWeights *w, const MpmVec *slope,
                                     int dimension, int width, MpmVec gradient[3]) {
-  for (int j = 0; j < 3; j++) gradient[j] = (MpmVec){0.0, 0.0, 0.0, 0.0};
   const int rows = dimension == 3 ? width * width : width;
 #pragma GCC unroll 9
   for (int r = 0; r < rows; r++) {
-    MpmVec along = {0.0, 0.0, 0.0, 0.0}, across = {0.0, 0.0, 0.0, 0.0};
+    const MpmVec *node = field + row[r];
+    MpmVec along = w->value[0][1] * node[0], across = slope[0][1] * node[0];
 #pragma GCC unroll 3
-    for (int a = 0; a < width; a++) {
-      along += w->value[a][1] * field[row[r] + a];
-      across += slope[a][1] * field[row[r] + a];
-    }
-    gradient[0] += mpm_across(w->value, w->value, r, dimension, width) * across;
-    gradient[1] += mpm_across(slope, w->value, r, dimension, width) * along;
-    if (dimension == 3) gradient[2] += mpm_across(w->value, slope, r, dimension, width) * along;
+    for (int a = 1; a < width; a++) along += w->value[a][1] * node[a], across += slope[a][1] * node[a];
+    const MpmVec term[3] = {mpm_across(w->value, w->value, r, dimension, width) * across,
+                            mpm_across(slope, w->value, r, dimension, width) * along,
+                            mpm_across(w->value, slope, r, dimension, width) * along};
+#pragma GCC unroll 3
+    for (int j = 0; j < dimension; j++) gradient[j] = r == 0 ? term[j] : gradient[j] + term[j];
   }
 }
 

@@ -95,6 +95,7 @@ MPM_CLONES static void momentum_extra(Mpm *mpm, const MpmVec *motion, const int 
 
 void mpm_p2g_momentum(Mpm *mpm, const MpmVec *motion, int with_heat, int with_affine) {
   MpmGrid *grid = &mpm->grid;
+  mpm_share_start(mpm);
 #pragma omp parallel num_threads(mpm->threads) if (mpm_is_parallel(mpm))
   {
 #pragma omp for
@@ -102,13 +103,14 @@ void mpm_p2g_momentum(Mpm *mpm, const MpmVec *motion, int with_heat, int with_af
       grid->sum[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
       if (with_heat) grid->heat[n][0] = grid->heat[n][1] = 0.0;
     }
-    for (int colour = 0; colour < 2; colour++)
-#pragma omp for schedule(dynamic, 1)
-      for (int s = 0; s < grid->slabs[colour]; s++) {
+    for (int colour = 0; colour < 2; colour++) {
+      for (int s; (s = mpm_share_next(mpm, colour)) >= 0;) {
         const int *range = grid->slab[colour] + 2 * s;
         if (with_heat || with_affine) momentum_extra(mpm, motion, range, (Extras){with_heat, with_affine});
         else momentum_plain(mpm, motion, range);
       }
+#pragma omp barrier
+    }
   }
 }
 
@@ -165,16 +167,18 @@ MPM_CLONES void mpm_p2g_load_cells(Mpm *mpm, int first, int end) {
 void mpm_p2g_load(Mpm *mpm) {
   MpmGrid *grid = &mpm->grid;
   const int is_given = mpm_uses_load(mpm);
+  mpm_share_start(mpm);
 #pragma omp parallel num_threads(mpm->threads) if (mpm_is_parallel(mpm))
   {
 #pragma omp for
     for (int n = 0; n < grid->nodes; n++) grid->rate[n] = (MpmVec){0.0, 0.0, 0.0, 0.0};
-    for (int colour = 0; colour < 2; colour++)
-#pragma omp for schedule(dynamic, 1)
-      for (int s = 0; s < grid->slabs[colour]; s++) {
+    for (int colour = 0; colour < 2; colour++) {
+      for (int s; (s = mpm_share_next(mpm, colour)) >= 0;) {
         const int *range = grid->slab[colour] + 2 * s;
         if (is_given) load_given(mpm, range[0], range[1]);
         else mpm_p2g_load_cells(mpm, range[0], range[1]);
       }
+#pragma omp barrier
+    }
   }
 }

@@ -8,28 +8,63 @@
 
 /* ------------------------------------------------------------------------------------------------------ memory */
 
-#define ADD_PLANE(p, member) add_plane(p, (void **)&(p)->member, sizeof *(p)->member)
-static void add_plane(MpmPoints *p, void **rows, size_t width) {
-  p->plane[p->planes] = (MpmPlane){rows, &p->spare[p->planes], width};
-  p->planes++;
+enum { PLANE_MOVES, PLANE_CONSTANT, PLANE_STAYS };
+#define ADD_PLANE(p, member, kind) add_plane(p, (void **)&(p)->member, sizeof *(p)->member, kind)
+static void add_plane(MpmPoints *p, void **rows, size_t width, int kind) {
+  MpmPlane *plane = &p->plane[p->planes++];
+  plane->rows = rows, plane->width = width;
+  plane->is_constant = kind == PLANE_CONSTANT;
+  plane->moves = kind != PLANE_STAYS;
 }
 
-/* The arrays whose rows move with the points. velocity_gradient is found anew before it is read. */
+/* velocity_gradient is found anew before it is read. Of the stress a local law leaves xz and yz alone in the plane. */
 static void list_planes(Mpm *mpm) {
   MpmPoints *p = &mpm->points;
   const int dimension = mpm->scene.dimension;
   p->planes = 0;
-  ADD_PLANE(p, slot);
-  ADD_PLANE(p, key);
-  ADD_PLANE(p, tag);
-  ADD_PLANE(p, position);
-  ADD_PLANE(p, motion);
-  ADD_PLANE(p, force);
-  ADD_PLANE(p, volume0);
-  if (mpm->scene.shape == MPM_SHAPE_GIMP) ADD_PLANE(p, half);
-  if (mpm->scene.transfer == MPM_TRANSFER_APIC) ADD_PLANE(p, affine);
-  for (int n = 0; n < dimension * dimension; n++) ADD_PLANE(p, deformation_gradient[mpm_component(dimension, n)]);
-  for (int n = 0; n < 6; n++) ADD_PLANE(p, stress[n]);
+  ADD_PLANE(p, slot, PLANE_MOVES);
+  ADD_PLANE(p, key, PLANE_MOVES);
+  ADD_PLANE(p, tag, PLANE_MOVES);
+  ADD_PLANE(p, position, PLANE_MOVES);
+  ADD_PLANE(p, motion, PLANE_MOVES);
+  ADD_PLANE(p, force, PLANE_CONSTANT);
+  ADD_PLANE(p, volume0, PLANE_CONSTANT);
+  if (mpm->scene.shape == MPM_SHAPE_GIMP) ADD_PLANE(p, half, mpm->scene.gimp_stretch ? PLANE_MOVES : PLANE_CONSTANT);
+  if (mpm->scene.transfer == MPM_TRANSFER_APIC) ADD_PLANE(p, affine, PLANE_MOVES);
+  for (int n = 0; n < dimension * dimension; n++) {
+    ADD_PLANE(p, deformation_gradient[mpm_component(dimension, n)], PLANE_MOVES);
+    ADD_PLANE(p, velocity_gradient[mpm_component(dimension, n)], PLANE_STAYS);
+  }
+  for (int n = 0; n < 6; n++)
+    ADD_PLANE(p, stress[n], dimension == 2 && n > 3 && mpm_law_is_local(mpm) ? PLANE_CONSTANT : PLANE_MOVES);
+}
+
+/* All planes in one block. Loops read a dozen arrays at the same row: if these began at the same place of a page, as
+ * large blocks from malloc do, their rows would compete for the same few lines of the first-level cache. */
+static BaseStatus grow_planes(MpmPoints *p, size_t room) {
+  enum { LINE = 64, PAGE = 4096, APART = 13 * LINE };
+  size_t bytes = 0, offset[MPM_PLANES_MAX];
+  for (int n = 0; n < p->planes; n++) {
+    const size_t place = (size_t)n * APART % PAGE;
+    offset[n] = bytes + (place + PAGE - bytes % PAGE) % PAGE;
+    bytes = (offset[n] + room * p->plane[n].width + LINE - 1) / LINE * LINE;
+  }
+  char *block;
+  TRY(BASE_ALLOC(bytes, &block));
+  for (int n = 0; n < p->planes; n++) {
+    MpmPlane *plane = &p->plane[n];
+    char *rows = block + offset[n];
+    if (p->room > 0) {
+      const char *old; /* of several types */
+      memcpy(&old, plane->rows, sizeof old);
+      memcpy(rows, old, (size_t)p->room * plane->width);
+    }
+    memcpy(plane->rows, &rows, sizeof rows);
+    if (plane->moves) TRY(base_grow(0, room, plane->width, &plane->spare));
+  }
+  base_free(p->block);
+  p->block = block;
+  return BASE_OK;
 }
 
 BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
@@ -38,12 +73,7 @@ BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
   if (count <= p->room) return BASE_OK;
   const size_t room = (size_t)count + (size_t)count / 4 + 16;
   list_planes(mpm);
-  for (int n = 0; n < p->planes; n++) {
-    TRY(base_grow((size_t)p->room, room, p->plane[n].width, p->plane[n].rows));
-    TRY(base_grow(0, room, p->plane[n].width, p->plane[n].spare));
-  }
-  for (int n = 0; n < scene->dimension * scene->dimension; n++)
-    TRY(BASE_GROW(0, room, &p->velocity_gradient[mpm_component(scene->dimension, n)]));
+  TRY(grow_planes(p, room));
   if (scene->order != MPM_ORDER_USF) TRY(BASE_GROW(0, room, &p->old_position));
   if (scene->thermal) TRY(BASE_GROW(0, room, &p->heat));
   if (scene->transfer == MPM_TRANSFER_XPIC) TRY(BASE_GROW(0, room, &p->gathered));
@@ -53,8 +83,9 @@ BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
   }
   TRY(BASE_GROW(0, room, &p->moves));
   TRY(BASE_GROW(0, room, &p->mover));
-  TRY(BASE_GROW(0, room, &p->target));
-  TRY(BASE_GROW(0, 2 * room + 1, &p->stretch));
+  TRY(BASE_GROW(0, room, &p->source));
+  TRY(BASE_GROW(0, room + 1, &p->region));
+  TRY(BASE_GROW(0, room, &p->fetch));
   TRY(BASE_GROW(0, room, &p->item));
   TRY(BASE_GROW(0, room, &p->spare_item));
   p->room = (int)room;
@@ -89,16 +120,12 @@ BaseStatus mpm_batch_reserve(Mpm *mpm, int count) {
 
 void mpm_points_free(Mpm *mpm) {
   MpmPoints *p = &mpm->points;
-  for (int n = 0; n < p->planes; n++) {
-    void *rows;
-    memcpy(&rows, p->plane[n].rows, sizeof rows);
-    base_free(rows), base_free(p->spare[n]);
-  }
-  for (int n = 0; n < 9; n++) base_free(p->velocity_gradient[n]);
-  void *const memory[] = {p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->mover, p->target,
-                          p->stretch, p->foreign_slot, p->item, p->spare_item, p->law_tag, p->law_velocity_gradient,
-                          p->law_deformation_gradient, p->law_temperature, p->law_temperature_rate, p->batch.stress,
-                          p->batch.heat, p->batch.conductivity, p->batch.modulus, p->batch.scalars};
+  for (int n = 0; n < p->planes; n++) base_free(p->plane[n].spare);
+  void *const memory[] = {p->block, p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->mover,
+                          p->source, p->region, p->fetch, p->foreign_slot, p->item, p->spare_item, p->law_tag,
+                          p->law_velocity_gradient, p->law_deformation_gradient, p->law_temperature,
+                          p->law_temperature_rate, p->batch.stress, p->batch.heat, p->batch.conductivity,
+                          p->batch.modulus, p->batch.scalars};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   memset(p, 0, sizeof *p);
 }
@@ -195,6 +222,8 @@ MPM_INLINE void prefetch_point(const MpmPoints *p, int k) {
   for (size_t line = 0; line < sizeof(MpmPoint); line += 64) __builtin_prefetch(next + line);
 }
 
+static int is_equal(MpmVec a, MpmVec b) { return mpm_mask_all(a == b); }
+
 /* 1 if the rows hold these points in this order already. */
 static int is_known(const MpmPoints *p, const MpmPoint *points, int count) {
   if (!p->has_order || count != p->own) return 0;
@@ -224,6 +253,8 @@ static void find_order(Mpm *mpm, const MpmPoint *points, int count) {
 
 BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count) {
   MpmPoints *p = &mpm->points;
+  mpm_points_forget_movers(mpm);
+  p->uniform_known = 0;
   TRY(mpm_points_reserve(mpm, count));
   /* Without a grid for this order nobody could tell which points have left their cells since: they are sorted anew. */
   const int known = mpm->grid.is_current && is_known(p, points, count);
@@ -249,6 +280,8 @@ BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count) {
     prefetch_point(p, k);
     load_own(mpm, k, &points[p->slot[k]]);
   }
+  p->equal_domains = count > 0 && p->half && !mpm->scene.gimp_stretch;
+  for (int k = 1; k < count && p->equal_domains; k++) p->equal_domains = is_equal(p->half[k], p->half[0]);
   double low = INFINITY, high = 0.0;
   for (int k = 0; k < count; k++) low = fmin(low, p->position[k][0]), high = fmax(high, p->position[k][0]);
   p->mass_low = low, p->mass_high = high;
@@ -274,6 +307,7 @@ void mpm_points_load_foreign(Mpm *mpm, const MpmPoint *foreign) {
     p->foreign_slot[s] = p->item[s].index;
     p->key[k] = p->item[s].cell;
     load_common(mpm, k, point);
+    p->equal_domains = p->equal_domains && is_equal(p->half[k], p->half[0]);
     p->force[k] = vector_of(3, 0.0, none);
     if (p->old_position) p->old_position[k] = p->position[k]; /* nobody here moves them */
     p->mass_low = fmin(p->mass_low, point->mass), p->mass_high = fmax(p->mass_high, point->mass);

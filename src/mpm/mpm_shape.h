@@ -25,6 +25,10 @@ typedef double MpmVec __attribute__((vector_size(32)));
 typedef long long MpmMask __attribute__((vector_size(32)));
 
 MPM_INLINE MpmVec mpm_vec_all(double x) { return (MpmVec){x, x, x, x}; }
+/* The axes' lanes alone. */
+MPM_INLINE int mpm_axes_all(MpmMask mask, int dimension) {
+  return (mask[1] & mask[2] & (dimension == 3 ? mask[3] : -1)) != 0;
+}
 MPM_INLINE int mpm_mask_all(MpmMask mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
 /* Four rows of an array, of which `n` (1 to 4) exist: the others repeat the last one and are not written. */
 MPM_INLINE MpmVec mpm_vec_load(const double *row, int n) {
@@ -38,14 +42,18 @@ MPM_INLINE void mpm_vec_store(MpmVec x, double *row, int n) {
     for (int i = 0; i < n; i++) row[i] = x[i];
   else __builtin_memcpy(row, &x, sizeof x);
 }
+/* a where the mask is set, else b. */
+MPM_INLINE MpmVec mpm_vec_select(MpmMask mask, MpmVec a, MpmVec b) {
+  return (MpmVec)(((MpmMask)a & mask) | ((MpmMask)b & ~mask));
+}
 /* x where x > 0, else 0. */
 MPM_INLINE MpmVec mpm_vec_positive(MpmVec x) { return (MpmVec)((MpmMask)x & (x > 0.0)); }
 
 /* value[a] = S at node base + a, slope[a] = dS/du, axis by axis. uGIMP: mean of the hat function over [f - half, f +
  * half], half <= 1/2 (TM-DEMPM eq. 12-13 with the undeformed domain). The middle value closes the partition of unity.
  */
-MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec value[MPM_WIDTH_MAX],
-                               MpmVec slope[MPM_WIDTH_MAX]) {
+MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec inverse /* of 2 half */,
+                               MpmVec value[MPM_WIDTH_MAX], MpmVec slope[MPM_WIDTH_MAX]) {
   if (shape == MPM_SHAPE_LINEAR) {
     value[0] = 1.0 - f, value[1] = f;
     slope[0] = mpm_vec_all(-1.0), slope[1] = mpm_vec_all(1.0);
@@ -59,7 +67,6 @@ MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec val
     const MpmVec left = 1.0 - (f - half);                        /* from the domain's left end to node 1 */
     const MpmVec rest = mpm_vec_positive(left - 2.0 * half);     /* of it not covered by the domain */
     const MpmVec right = mpm_vec_positive(2.0 * half - left);    /* of the domain beyond node 1 */
-    const MpmVec inverse = 0.5 / half;
     value[0] = 0.5 * inverse * (left - rest) * (left + rest), value[2] = 0.5 * inverse * right * right;
     slope[0] = -inverse * (left - rest), slope[2] = inverse * right;
     value[1] = 1.0 - value[0] - value[2];
@@ -71,7 +78,7 @@ MPM_INLINE void mpm_shape_axes(MpmShape shape, MpmVec f, MpmVec half, MpmVec val
 MPM_INLINE void mpm_shape_axis(MpmShape shape, double f, double half, double value[MPM_WIDTH_MAX],
                                double slope[MPM_WIDTH_MAX]) {
   MpmVec values[MPM_WIDTH_MAX], slopes[MPM_WIDTH_MAX];
-  mpm_shape_axes(shape, mpm_vec_all(f), mpm_vec_all(half), values, slopes);
+  mpm_shape_axes(shape, mpm_vec_all(f), mpm_vec_all(half), mpm_vec_all(0.5 / half), values, slopes);
   for (int a = 0; a < mpm_shape_width(shape); a++) value[a] = values[a][0], slope[a] = slopes[a][0];
 }
 

@@ -33,6 +33,7 @@ BaseStatus mpm_set_stretch(Mpm *mpm, const double stretch[3]) {
       return base_error(BASE_ERROR_ARGUMENT, "the grid cannot be stretched along axis %d, which is periodic", i);
   }
   set_spacing(mpm, stretch);
+  mpm_points_forget_movers(mpm);
   return BASE_OK;
 }
 
@@ -52,7 +53,7 @@ BaseStatus mpm_create(const MpmScene *scene, const MpmLaw *law, const MpmHalo *h
   mpm->threads = scene->threads > 0 ? scene->threads : omp_get_max_threads();
   mpm->heat_duration = -1.0;
   *result = mpm;
-  return BASE_OK;
+  return BASE_ALLOC((size_t)(MPM_SHARES * mpm->threads), &mpm->queue);
 }
 
 void mpm_destroy(Mpm *mpm) {
@@ -61,6 +62,7 @@ void mpm_destroy(Mpm *mpm) {
   mpm_grid_free(&mpm->grid);
   mpm_wall_free(mpm);
   base_free(mpm->tractions);
+  base_free(mpm->queue);
   base_free(mpm);
 }
 
@@ -131,6 +133,7 @@ static void drop_points_if_failed(Mpm *mpm) {
   mpm->points.live = mpm->points.count = 0;
   mpm->points.has_order = mpm->grid.is_current = 0;
   mpm->grid.cells = mpm->grid.nodes = mpm->grid.slabs[0] = mpm->grid.slabs[1] = 0;
+  mpm_share_set(mpm);
   mpm->contact_count = 0;
 }
 
@@ -251,7 +254,10 @@ static BaseStatus advance(Mpm *mpm) {
   }
   mpm_g2p_update(mpm);
   if (mpm->scene.thermal && mpm->heat_duration >= 0.0) mpm_heat_carry(mpm);
-  if (mpm->scene.mechanical) mpm_wall_guard(mpm);
+  if (mpm->scene.mechanical && mpm->wall_scratch.nears > 0) {
+    mpm_wall_guard(mpm);
+    mpm_points_forget_movers(mpm);
+  }
   return BASE_OK;
 }
 
