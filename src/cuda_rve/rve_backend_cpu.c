@@ -60,7 +60,7 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
 }
 
 #ifdef RVE_MIXED
-#define ROWS {4, 8}, {2, 4}
+#define ROWS {4, 8}, {2, 4} /* rve_row_doubles() */
 #else
 #define ROWS {8, 12}, {4, 8}
 #endif

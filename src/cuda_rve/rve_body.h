@@ -64,57 +64,72 @@ RVE_FN void rve_branch(int dim, const rve_real h[9], const rve_int si[3], const 
 
 typedef RveBody RveNearBody;
 #define near_own_body rve_own_body
-#define near_neighbour_body rve_neighbour_body
 #define near_branch rve_branch
 #define near_dot rve_dot
 
-RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveBody other;
+/* Places and radii of neighbours (2D: and all else, their rows are short); then the rest. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   if (ft.dimension == 2) {
     const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1], a->velocity[0],
                                  a->velocity[1]};
     const double *const f1[4] = {a->spin[0], a->radius, ft.viscous ? a->mass : 0, 0};
     const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0), p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
-    for (int k = 0; k < 2; k++) other.s[k] = rve_int_from_bits(q.f[k]), other.v[k] = q.f[k + 2];
-    other.w[0] = p.f[0], other.r = p.f[1], other.m = p.f[2];
-  } else {
-    const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1],
-                                 (const double *)a->position[2], a->radius};
-    const double *const f1[4] = {a->velocity[0], a->velocity[1], a->velocity[2], ft.viscous ? a->mass : 0};
-    const double *const f2[4] = {a->spin[0], a->spin[1], a->spin[2], 0};
-    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0);
-    for (int k = 0; k < 3; k++) other.s[k] = rve_int_from_bits(q.f[k]);
-    other.r = q.f[3];
-    if (ft.tangential || ft.viscous) {
-      const RveQuad p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
-      for (int k = 0; k < 3; k++) other.v[k] = p.f[k];
-      other.m = p.f[3];
-    }
-    if (ft.tangential) {
-      const RveQuad t = rve_gather(a->row + 8, f2, a->neighbour, lane0);
-      for (int k = 0; k < 3; k++) other.w[k] = t.f[k];
-    }
+    for (int k = 0; k < 2; k++) other->s[k] = rve_int_from_bits(q.f[k]), other->v[k] = q.f[k + 2];
+    other->w[0] = p.f[0], other->r = p.f[1], other->m = p.f[2];
+    return;
   }
+  const double *const f[4] = {(const double *)a->position[0], (const double *)a->position[1],
+                              (const double *)a->position[2], a->radius};
+  const RveQuad q = rve_gather(a->row, f, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->s[k] = rve_int_from_bits(q.f[k]);
+  other->r = q.f[3];
+}
+
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  if (ft.dimension == 2) return;
+  const double *const f0[4] = {a->velocity[0], a->velocity[1], a->velocity[2], ft.viscous ? a->mass : 0};
+  const double *const f1[4] = {a->spin[0], a->spin[1], a->spin[2], 0};
+  const RveQuad q = rve_gather(a->row + 4, f0, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->v[k] = q.f[k];
+  other->m = q.f[3];
+  if (!ft.tangential) return;
+  const RveQuad t = rve_gather(a->row + 8, f1, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->w[k] = t.f[k];
+}
+
+/* Of what near_neighbour_place has read, what is still needed once the branch is known. */
+RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
+  kept->r = other->r;
+  if (ft.dimension == 3) return;
+  for (int k = 0; k < 2; k++) kept->v[k] = other->v[k];
+  kept->w[0] = other->w[0], kept->m = other->m;
+}
+
+RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveBody other;
+  near_neighbour_place(ft, a, lane0, &other);
+  near_neighbour_motion(ft, a, lane0, &other);
   return other;
 }
 
 /* Writes the rows (or nothing, where arrays are read directly) of the pack at lane0. */
-RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *b) {
+RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
   if (!RVE_ROWS) return;
   double *const none[4] = {0, 0, 0, 0};
   double *const rows = a->row;
+  const int stride = rve_row_doubles(dimension);
   const rve_real zero = rve_set(0.0);
   if (dimension == 2) {
     const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), b->v[0], b->v[1]}};
     const RveQuad p = {{b->w[0], b->r, b->m, zero}};
-    rve_scatter(rows, n->row, none, lane0, q);
-    rve_scatter(rows + 4, n->row, none, lane0, p);
+    rve_scatter(rows, stride, none, lane0, q);
+    rve_scatter(rows + 4, stride, none, lane0, p);
   } else {
     const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), rve_bits_from_int(b->s[2]), b->r}};
     const RveQuad p = {{b->v[0], b->v[1], b->v[2], b->m}}, t = {{b->w[0], b->w[1], b->w[2], zero}};
-    rve_scatter(rows, n->row, none, lane0, q);
-    rve_scatter(rows + 4, n->row, none, lane0, p);
-    rve_scatter(rows + 8, n->row, none, lane0, t);
+    rve_scatter(rows, stride, none, lane0, q);
+    rve_scatter(rows + 4, stride, none, lane0, p);
+    rve_scatter(rows + 8, stride, none, lane0, t);
   }
 }
 
@@ -198,30 +213,45 @@ RVE_FN rve_real near_neighbour_mass(const RveArrays *a, int lane0) {
   return _mm512_i32gather_pd(at, a->mass, 8);
 }
 
-RVE_FN RveNearBody near_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveNearBody other;
+/* In 2D one row has all. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
   const RveQuad p = rve_gather(a->row, 0, a->neighbour, lane0), q = rve_gather(a->row, 0, a->neighbour, lane0 + 8);
   for (int k = 0; k < ft.dimension; k++) {
-    other.s[k].half[0] = rve_int_from_bits(p.f[k]);
-    other.s[k].half[1] = rve_int_from_bits(q.f[k]);
+    other->s[k].half[0] = rve_int_from_bits(p.f[k]);
+    other->s[k].half[1] = rve_int_from_bits(q.f[k]);
   }
   if (ft.dimension == 2) {
-    for (int k = 0; k < 2; k++) other.v[k] = near_unpair(p.f[2], q.f[2], k);
-    other.w[0] = near_unpair(p.f[3], q.f[3], 0);
-    other.r = near_unpair(p.f[3], q.f[3], 1);
-    if (ft.viscous)
-      other.m = near_join(_mm512_cvtpd_ps(near_neighbour_mass(a, lane0)),
-                          _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
-    return other;
+    for (int k = 0; k < 2; k++) other->v[k] = near_unpair(p.f[2], q.f[2], k);
+    other->w[0] = near_unpair(p.f[3], q.f[3], 0);
+    other->r = near_unpair(p.f[3], q.f[3], 1);
+    return;
   }
-  other.r = near_unpair(p.f[3], q.f[3], 0);
-  if (ft.viscous) other.m = near_unpair(p.f[3], q.f[3], 1);
-  if (!ft.tangential && !ft.viscous) return other;
+  other->r = near_unpair(p.f[3], q.f[3], 0);
+  if (ft.viscous) other->m = near_unpair(p.f[3], q.f[3], 1);
+}
+
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
+  if (ft.dimension == 2) {
+    if (ft.viscous)
+      other->m = near_join(_mm512_cvtpd_ps(near_neighbour_mass(a, lane0)),
+                           _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
+    return;
+  }
   const RveQuad t = rve_gather(a->row + 4, 0, a->neighbour, lane0),
                 u = rve_gather(a->row + 4, 0, a->neighbour, lane0 + 8);
-  for (int k = 0; k < 3; k++) other.v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
-  for (int k = 0; ft.tangential && k < 3; k++) other.w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
-  return other;
+  for (int k = 0; k < 3; k++) other->v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
+  for (int k = 0; ft.tangential && k < 3; k++)
+    other->w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
+}
+
+RVE_FN void near_keep_place(RveFeatures ft, const RveNearBody *other, RveNearBody *kept) {
+  kept->r = other->r;
+  if (ft.dimension == 3) {
+    if (ft.viscous) kept->m = other->m;
+    return;
+  }
+  for (int k = 0; (ft.tangential || ft.viscous) && k < 2; k++) kept->v[k] = other->v[k];
+  if (ft.tangential) kept->w[0] = other->w[0];
 }
 
 RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
@@ -243,20 +273,20 @@ RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0)
   return other;
 }
 
-RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *b) {
+RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
   double *const none[4] = {0, 0, 0, 0};
+  const int stride = rve_row_doubles(dimension);
   RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), near_pair(b->v[0], b->v[1]),
                 near_pair(b->w[0], b->r)}};
-  (void)n;
   if (dimension == 2) {
-    rve_scatter(a->row, 4, none, lane0, q);
+    rve_scatter(a->row, stride, none, lane0, q);
     return;
   }
   q.f[2] = rve_bits_from_int(b->s[2]);
   q.f[3] = near_pair(b->r, b->m);
   const RveQuad t = {{near_pair(b->v[0], b->v[1]), near_pair(b->v[2], b->w[0]), near_pair(b->w[1], b->w[2]), rve_set(0.0)}};
-  rve_scatter(a->row, 8, none, lane0, q);
-  rve_scatter(a->row + 4, 8, none, lane0, t);
+  rve_scatter(a->row, stride, none, lane0, q);
+  rve_scatter(a->row + 4, stride, none, lane0, t);
 }
 
 /* The rounding of H alone would stretch all branches of a direction alike. */

@@ -31,6 +31,7 @@ typedef rve_mask near_mask;
 #define near_or rve_or
 #define near_and_not rve_and_not
 #define near_any rve_any
+#define near_largest rve_largest
 #define near_select rve_select
 #define near_keep rve_keep
 #define near_sum_wide(a) (a)
@@ -88,6 +89,7 @@ RVE_FN near_mask near_and(near_mask a, near_mask b) { return (near_mask)(a & b);
 RVE_FN near_mask near_or(near_mask a, near_mask b) { return (near_mask)(a | b); }
 RVE_FN near_mask near_and_not(near_mask a, near_mask b) { return (near_mask)(a & ~b); }
 RVE_FN int near_any(near_mask a) { return a != 0; }
+RVE_FN double near_largest(rve_near a) { return (double)_mm512_reduce_max_ps(a); }
 RVE_FN rve_near near_select(near_mask m, rve_near a, rve_near b) { return _mm512_mask_blend_ps(m, b, a); }
 RVE_FN rve_near near_keep(near_mask m, rve_near a) { return _mm512_maskz_mov_ps(m, a); }
 /* Both halves of a sum in FP64, on the lanes of one. */

@@ -15,7 +15,7 @@ typedef struct StateHeader {
 } StateHeader;
 
 static const char magic[8] = "dempmRVE";
-enum { STATE_VERSION = 1 };
+enum { STATE_VERSION = 2 };
 
 static uint64_t checksum_of(const StateHeader *header, const void *payload) {
   uint64_t hash = base_hash(header, offsetof(StateHeader, checksum), BASE_HASH_SEED);

@@ -8,7 +8,10 @@
  * The list. Grains are sorted by degree and dealt in blocks of `lanes`; grain i of block b owns the slots (row, i mod
  * lanes) of the rows slot_first[b] .. slot_first[b+1]. Each contact has exactly one slot, at the grain that "owns" it
  * (degrees are balanced); the other grain finds it in its incoming list. A slot without contact names its own grain,
- * many cells away. */
+ * many cells away.
+ *
+ * Pairs that touch or nearly do come first in a block's rows, the others have rows of their own. A row of which no pair
+ * touches rests until its nearest pair may: idle_until says when, on the clock of RveHead.approach. */
 #ifndef DEMPM_RVE_STATE_H
 #define DEMPM_RVE_STATE_H
 
@@ -22,7 +25,8 @@ enum {
   RVE_IMAGE_MAX = 5,        /* |P| of a contact in a reduced cell; more means the cell is too narrow */
   RVE_IMAGE_EMPTY = 6,      /* P_x of an empty slot */
   RVE_IMAGE_BOND = 1 << 12, /* intact bond */
-  RVE_IMAGE_VOID = 1 << 13  /* empty slot */
+  RVE_IMAGE_VOID = 1 << 13, /* empty slot */
+  RVE_IMAGE_FAR = 1 << 14   /* only while a list is built: no contact for some time to come */
 };
 
 enum { RVE_LIST_GOOD, RVE_LIST_CHECK /* its running bound is spent */, RVE_LIST_ABSENT /* must be built */ };
@@ -53,7 +57,7 @@ typedef struct RveHead {
   int32_t failed;   /* BASE_ERROR_UNSTABLE after the watchdog spoke, for ever */
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
-  int32_t pad[2];
+  double approach;   /* m: no gap between two grains has shrunk by more since the list was built; never falls */
 } RveHead;
 
 /* Arrays of an arena. N = blocks * lanes grains (the last ones are massless padding). [k] counts components. */
@@ -74,6 +78,7 @@ typedef struct RveArrays {
   double *reaction_field[6];            /* the same as arrays, if counts.reaction = 0 */
   uint32_t *incoming;                   /* [incoming] slot (its place in doubles, if counts.reaction > 0) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
+  double *idle_until; /* [row of slots] m: no contact, and all its forces and histories are 0, while approach is below */
 } RveArrays;
 
 /* What all steps of one call share. Deformation is given per DEM step: gradient * dt may differ from L * duration /
@@ -111,7 +116,8 @@ typedef struct RveScratch {
   int32_t *old_second, *old_next;    /* [pairs] saved contacts, chained by first grain */
   uint16_t *old_image;
   double *old_shear[3];
-  int32_t *chain, *order, *bucket, *out, *in, *rank, *place; /* [N + 2] */
+  int32_t *chain, *order, *bucket, *out, *far, *in, *rank, *place; /* [N + 2]; out, far: own near and far pairs */
+  int32_t *near_rows;                                              /* [N + 2] of each block */
   double *sorted[4]; /* [2 N + 64] fractional coordinates and radius, sorted along the first */
   double *swap;      /* [N] */
 } RveScratch;
@@ -152,20 +158,22 @@ RVE_ANY size_t rve_layout(const RveCounts *n, void *base, RveArrays *a) {
   a->incoming = (uint32_t *)rve_carve(base, &used, (size_t)n->incoming_rows * (size_t)n->lanes * 4);
   a->slot_first = (int32_t *)rve_carve(base, &used, ((size_t)n->blocks + 1) * 4);
   a->incoming_first = (int32_t *)rve_carve(base, &used, ((size_t)n->blocks + 1) * 4);
+  a->idle_until = (double *)rve_carve(base, &used, (size_t)n->slot_rows * 8);
   return used;
 }
 
 RVE_ANY size_t rve_scratch_layout(const RveCounts *n, int32_t pairs, void *base, RveScratch *s) {
   const size_t grains = (size_t)n->blocks * (size_t)n->lanes, p = (size_t)pairs;
   int32_t **const per_pair[] = {&s->first, &s->second, &s->history, &s->old_second, &s->old_next};
-  int32_t **const per_grain[] = {&s->chain, &s->order, &s->bucket, &s->out, &s->in, &s->rank, &s->place};
+  int32_t **const per_grain[] = {&s->chain, &s->order, &s->bucket, &s->out,      &s->far,
+                                 &s->in,    &s->rank,  &s->place,  &s->near_rows};
   size_t used = 0;
   s->pairs = pairs;
   for (int k = 0; k < 5; k++) *per_pair[k] = (int32_t *)rve_carve(base, &used, p * 4);
   s->image = (uint16_t *)rve_carve(base, &used, p * 2);
   s->old_image = (uint16_t *)rve_carve(base, &used, p * 2);
   for (int k = 0; k < 3; k++) s->old_shear[k] = (double *)rve_carve(base, &used, p * 8);
-  for (int k = 0; k < 7; k++) *per_grain[k] = (int32_t *)rve_carve(base, &used, (grains + 2) * 4);
+  for (int k = 0; k < 9; k++) *per_grain[k] = (int32_t *)rve_carve(base, &used, (grains + 2) * 4);
   for (int k = 0; k < 4; k++) s->sorted[k] = (double *)rve_carve(base, &used, (2 * grains + 64) * 8);
   s->swap = (double *)rve_carve(base, &used, grains * 8);
   return used;

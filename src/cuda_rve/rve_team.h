@@ -92,6 +92,7 @@ RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return (rve_mask)(a & b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return (rve_mask)(a | b); }
 RVE_FN rve_mask rve_and_not(rve_mask a, rve_mask b) { return (rve_mask)(a & ~b); }
 RVE_FN int rve_any(rve_mask a) { return a != 0; }
+RVE_FN double rve_largest(rve_real a) { return _mm512_reduce_max_pd(a); }
 RVE_FN rve_real rve_select(rve_mask m, rve_real a, rve_real b) { return _mm512_mask_blend_pd(m, b, a); }
 RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm512_maskz_mov_pd(m, a); }
 
@@ -157,6 +158,10 @@ RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return _mm256_and_pd(a, b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return _mm256_or_pd(a, b); }
 RVE_FN rve_mask rve_and_not(rve_mask a, rve_mask b) { return _mm256_andnot_pd(b, a); }
 RVE_FN int rve_any(rve_mask a) { return _mm256_movemask_pd(a) != 0; }
+RVE_FN double rve_largest(rve_real a) {
+  const __m128d b = _mm_max_pd(_mm256_castpd256_pd128(a), _mm256_extractf128_pd(a, 1));
+  return _mm_cvtsd_f64(_mm_max_pd(b, _mm_unpackhi_pd(b, b)));
+}
 RVE_FN rve_real rve_select(rve_mask m, rve_real a, rve_real b) { return _mm256_blendv_pd(b, a, m); }
 RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm256_and_pd(m, a); }
 
@@ -214,7 +219,16 @@ RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return a < b; }
 RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return a & b; }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return a | b; }
 RVE_FN rve_mask rve_and_not(rve_mask a, rve_mask b) { return a & !b; }
+#if defined(__CUDACC__)
+RVE_FN int rve_any(rve_mask a) { return __any_sync(0xffffffffu, a); }
+RVE_FN double rve_largest(rve_real a) {
+  for (int distance = 16; distance > 0; distance /= 2) a = rve_max(a, __shfl_xor_sync(0xffffffffu, a, distance));
+  return a;
+}
+#else
 RVE_FN int rve_any(rve_mask a) { return a; }
+RVE_FN double rve_largest(rve_real a) { return a; }
+#endif
 RVE_FN rve_real rve_select(rve_mask m, rve_real a, rve_real b) { return m ? a : b; }
 RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return m ? a : 0.0; }
 
@@ -226,6 +240,15 @@ enum { RVE_PARTS = 2 };
 enum { RVE_PARTS = 1 };
 #endif
 enum { RVE_PACK = RVE_PARTS * RVE_SPAN };
+
+/* RveCounts.row of these kernels. */
+RVE_FN int rve_row_doubles(int dimension) { return RVE_ROWS * 4 * (RVE_PARTS == 2 ? dimension - 1 : dimension); }
+/* Rows of slots whose contacts are computed part by part, see RveRow. */
+#if defined(__CUDACC__)
+enum { RVE_CHUNK = 1 };
+#else
+enum { RVE_CHUNK = 8 };
+#endif
 
 /* 1/sqrt(a) to round-off. */
 #if defined(RVE_ISA_AVX512)
