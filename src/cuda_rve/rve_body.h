@@ -13,9 +13,9 @@ typedef struct RveBody {
   rve_real v[3], w[3], r, m;
 } RveBody;
 
-/* What a contact does to its owner; the neighbour gets -force, and other_torque. */
+/* What a contact does to the neighbour, and to its owner, whose force is -push. */
 typedef struct RvePair {
-  rve_near force[3], torque[3], other_torque[3];
+  rve_near push[3], torque[3], other_torque[3];
 } RvePair;
 
 RVE_FN int rve_spins(RveFeatures ft) { return ft.dimension == 2 ? 1 : 3; }
@@ -138,38 +138,15 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArr
   double *const *const field = a->reaction_field;
   if (ft.dimension == 2) {
     double *const f[4] = {field[0], field[1], ft.tangential ? field[2] : 0, 0};
-    const RveQuad q = {{zero - p->force[0], zero - p->force[1], ft.tangential ? p->other_torque[0] : zero, zero}};
+    const RveQuad q = {{p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero}};
     rve_scatter_placed(a->reaction, f, lane0, q);
   } else {
     double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
-    double *const g[4] = {field[4], field[5], 0, 0};
     const RveQuad q = {
-        {zero - p->force[0], zero - p->force[1], zero - p->force[2], ft.tangential ? p->other_torque[0] : zero}};
+        {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero}};
     rve_scatter_placed(a->reaction, f, lane0, q);
-    if (ft.tangential) {
-      const RveQuad t = {{p->other_torque[1], p->other_torque[2], zero, zero}};
-      rve_scatter_placed(a->reaction + rve_reaction_plane(n), g, lane0, t);
-    }
-  }
-}
-
-/* Force and torque that a pack of grains gets from the slots of others. */
-RVE_FN void rve_sum_reactions(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3],
-                              rve_real torque[3]) {
-  const int block = lane0 / RVE_PACK, first = a->incoming_first[block], last = a->incoming_first[block + 1];
-  double *const *const field = a->reaction_field;
-  const double *const f[4] = {field[0], field[1], field[2], ft.dimension == 3 && ft.tangential ? field[3] : 0};
-  const RveQuad q = rve_sum_rows(a->reaction, f, a->incoming, first, last);
-  force[0] = q.f[0], force[1] = q.f[1];
-  if (ft.dimension == 2) {
-    torque[0] = q.f[2];
-  } else {
-    force[2] = q.f[2], torque[0] = q.f[3];
-    if (ft.tangential) {
-      const double *const g[4] = {field[4], field[5], 0, 0};
-      const RveQuad t = rve_sum_rows(a->reaction + rve_reaction_plane(n), g, a->incoming, first, last);
-      torque[1] = t.f[0], torque[2] = t.f[1];
-    }
+    if (ft.tangential)
+      rve_scatter_pairs(a->reaction + rve_reaction_plane(n), field + 4, lane0, p->other_torque[1], p->other_torque[2]);
   }
 }
 
@@ -310,41 +287,14 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArr
   const rve_near zero = near_set(0.0);
   (void)n;
   if (ft.dimension == 2) {
-    const rve_near q[4] = {zero - p->force[0], zero - p->force[1], ft.tangential ? p->other_torque[0] : zero, zero};
+    const rve_near q[4] = {p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero};
     near_scatter_placed(a->reaction, lane0, q);
     return;
   }
-  const rve_near q[4] = {zero - p->force[0], zero - p->force[1], zero - p->force[2],
-                         ft.tangential ? p->other_torque[0] : zero};
+  const rve_near q[4] = {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero};
   near_scatter_placed(a->reaction, lane0, q);
   if (!ft.tangential) return;
-  const rve_near t[4] = {p->other_torque[1], p->other_torque[2], zero, zero};
-  near_scatter_placed(a->reaction + rve_reaction_plane(n), lane0, t);
-}
-
-/* Per lane: the sum of the reactions that come in, four FP32 fields at `rows`. */
-RVE_FN RveQuad near_sum_rows(const double *rows, const RveArrays *a, int lane0) {
-  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK;
-  RveFour row[RVE_SPAN];
-  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_zero();
-  for (int m = a->incoming_first[block]; m < a->incoming_first[block + 1]; m++)
-    for (int l = 0; l < RVE_SPAN; l++)
-      row[l] = rve_four_add(row[l], near_four(rows + a->incoming[m * RVE_PACK + part + l]));
-  return rve_transpose(row);
-}
-
-RVE_FN void rve_sum_reactions(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3],
-                              rve_real torque[3]) {
-  const RveQuad q = near_sum_rows(a->reaction, a, lane0);
-  force[0] = q.f[0], force[1] = q.f[1];
-  if (ft.dimension == 2) {
-    torque[0] = q.f[2];
-    return;
-  }
-  force[2] = q.f[2], torque[0] = q.f[3];
-  if (!ft.tangential) return;
-  const RveQuad t = near_sum_rows(a->reaction + rve_reaction_plane(n), a, lane0);
-  torque[1] = t.f[0], torque[2] = t.f[1];
+  near_scatter_pairs(a->reaction + rve_reaction_plane(n), lane0, p->other_torque[1], p->other_torque[2]);
 }
 
 RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3]) {
@@ -356,4 +306,59 @@ RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, i
 }
 
 #endif
+
+/* ----------------------------------------------------------------------------------------------------- both forms */
+
+/* 1 if all slots that a row of the incoming list names rest; then their reactions are 0. */
+RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) {
+  if (head->approach < a->incoming_idle[row]) return 1;
+  double until = 1e300;
+#if defined(__CUDACC__)
+  until = 0.0 - rve_largest(0.0 - a->idle_until[a->incoming[row * RVE_PACK + RVE_LANE] / RVE_PACK]);
+#else
+  for (int l = 0; l < RVE_PACK; l++) {
+    const double here = a->idle_until[a->incoming[row * RVE_PACK + l] / (RVE_PACK * RVE_REACTION)];
+    until = here < until ? here : until;
+  }
+#endif
+  a->incoming_idle[row] = until;
+  return head->approach < until;
+}
+
+/* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. */
+RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveCounts *n, const RveArrays *a, int lane0,
+                              rve_real force[3], rve_real torque[3]) {
+  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK, second = ft.dimension == 3 && ft.tangential;
+  const double *const more = second ? a->reaction + rve_reaction_plane(n) : a->reaction;
+#if defined(__CUDACC__)
+  (void)more;
+  for (int k = 0; k < 3; k++) force[k] = torque[k] = 0.0;
+#else
+  RveFour sum[RVE_SPAN];
+  RveTwo pair[RVE_SPAN];
+  for (int l = 0; l < RVE_SPAN; l++) sum[l] = rve_four_zero(), pair[l] = rve_two_zero();
+#endif
+  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
+    if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
+    const uint32_t *at = a->incoming + row * RVE_PACK + part;
+#if defined(__CUDACC__)
+    for (int k = 0; k < ft.dimension; k++) force[k] += a->reaction_field[k][at[RVE_LANE]];
+    for (int k = 0; ft.tangential && k < rve_spins(ft); k++)
+      torque[k] += a->reaction_field[ft.dimension + k][at[RVE_LANE]];
+#else
+    for (int l = 0; l < RVE_SPAN; l++) {
+      sum[l] = rve_four_add(sum[l], near_four(a->reaction + at[l]));
+      if (second) pair[l] = rve_two_add(pair[l], near_two(more + at[l] / 2));
+    }
+#endif
+  }
+#if !defined(__CUDACC__)
+  const RveQuad q = rve_transpose(sum);
+  force[0] = q.f[0], force[1] = q.f[1];
+  if (ft.dimension == 2) torque[0] = q.f[2];
+  else force[2] = q.f[2], torque[0] = q.f[3];
+  if (second) rve_unpair(pair, torque + 1);
+#endif
+}
+
 #endif

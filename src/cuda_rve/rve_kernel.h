@@ -139,14 +139,17 @@ RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a,
   return near_any(row->touch);
 }
 
-/* Nothing touches in this row: what it left is made 0. The margin covers the rounding of FP32. */
-RVE_FN void rve_rest(RveFeatures ft, const RveHead *head, const RveCounts *n, const RveArrays *a, const RveRow *row) {
+/* Nothing touches in this row, and what it left is 0. The margin covers the rounding of FP32. */
+RVE_FN void rve_rest(const RveHead *head, const RveArrays *a, const RveRow *row) {
   const double cap = head->radius_max * head->scale, gap = 0.0 - near_largest(row->overlap);
+  a->idle_until[row->lane0 / RVE_PACK] = head->approach + (gap < cap ? gap : cap) - 1e-6 * cap;
+}
+
+RVE_FN void rve_clear(RveFeatures ft, const RveCounts *n, const RveArrays *a, const RveRow *row) {
   RvePair none;
-  for (int k = 0; k < 3; k++) none.force[k] = none.torque[k] = none.other_torque[k] = near_set(0.0);
+  for (int k = 0; k < 3; k++) none.push[k] = none.torque[k] = none.other_torque[k] = near_set(0.0);
   near_write_reaction(ft, n, a, row->lane0, &none);
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, near_set(0.0));
-  a->idle_until[row->lane0 / RVE_PACK] = head->approach + (gap < cap ? gap : cap) - 1e-6 * cap;
 }
 
 /* Second part: relative motion, and the tangential force if nothing slid: history turned with the flow, plus the step's
@@ -230,13 +233,13 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
     for (int k = 0; k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, spring[k]);
   }
   fn = near_keep(touch, fn);
-  for (int k = 0; k < dim; k++) p.force[k] = zero - fn * n[k];
+  for (int k = 0; k < dim; k++) p.push[k] = fn * n[k];
   if (ft.tangential) {
     if (dim == 2) {
-      p.force[0] = p.force[0] - total[0] * n[1];
-      p.force[1] = p.force[1] + total[0] * n[0];
+      p.push[0] = p.push[0] + total[0] * n[1];
+      p.push[1] = p.push[1] - total[0] * n[0];
     } else
-      for (int k = 0; k < 3; k++) p.force[k] = p.force[k] + total[k];
+      for (int k = 0; k < 3; k++) p.push[k] = p.push[k] - total[k];
   }
   return p;
 }
@@ -251,7 +254,7 @@ RVE_FN void rve_add_contact(RveFeatures ft, const RveContactPass *c, const RveCo
                             const RveNearBody *own, const RveRow *row, RveContactSums *sum) {
   const RvePair p = rve_contact(ft, c, a, own, row, &sum->slid, &sum->lost);
   near_write_reaction(ft, n, a, row->lane0, &p);
-  for (int k = 0; k < ft.dimension; k++) sum->force[k] = sum->force[k] + p.force[k];
+  for (int k = 0; k < ft.dimension; k++) sum->force[k] = sum->force[k] - p.push[k];
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) sum->torque[k] = sum->torque[k] + p.torque[k];
 }
 
@@ -264,7 +267,7 @@ RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const Rv
     for (; at < a->slot_first[block + 1] && rows < RVE_CHUNK; at++) {
       if (head->approach < a->idle_until[at]) continue;
       if (rve_meet(ft, c, a, own, at * RVE_PACK, &row[rows])) rows++;
-      else rve_rest(ft, head, n, a, &row[rows]);
+      else rve_clear(ft, n, a, &row[rows]), rve_rest(head, a, &row[rows]);
     }
     if (ft.tangential || ft.viscous)
       for (int r = 0; r < rows; r++) rve_slide(ft, c, a, own, &row[r]);
@@ -278,12 +281,10 @@ RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveH
   for (int at = a->slot_first[block]; at < a->slot_first[block + 1]; at++) {
     RveRow row;
     if (head->approach < a->idle_until[at]) continue;
-    if (!rve_meet(ft, c, a, own, at * RVE_PACK, &row)) {
-      rve_rest(ft, head, n, a, &row);
-      continue;
-    }
+    const int touching = rve_meet(ft, c, a, own, at * RVE_PACK, &row);
     if (ft.tangential || ft.viscous) rve_slide(ft, c, a, own, &row);
     rve_add_contact(ft, c, n, a, own, &row, sum);
+    if (!touching) rve_rest(head, a, &row); /* asked last: the compiler may not mix what stands before and behind */
   }
 }
 
@@ -382,7 +383,7 @@ RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *ca
     const int left = (spans - first + team->packs - 1) / team->packs, many = left < chunk ? left : chunk;
     RveSpanForce sum[RVE_CHUNK];
     for (int q = 0; q < many; q++)
-      rve_sum_reactions(ft, n, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
+      rve_sum_reactions(ft, head, n, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
     for (int q = 0; q < many; q++)
       rve_move(ft, &m, call->thermal, a, (first + q * team->packs) * RVE_SPAN, &sum[q], fastest, loss);
   }

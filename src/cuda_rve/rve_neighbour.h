@@ -303,11 +303,12 @@ RVE_FN int rve_search(const RveHead *head, const RveCounts *n, const RveArrays *
 
 /* Gives each pair to one of its grains so that out-degrees differ little, of near and of far pairs. */
 RVE_FN void rve_balance(const RveCounts *n, RveScratch *s, int pairs) {
-  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->far[i] = s->in[i] = 0;
+  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->out_far[i] = s->in[i] = s->in_far[i] = 0;
   for (int pass = 0; pass < 4; pass++)
     for (int c = 0; c < pairs; c++) {
       const int i = s->first[c], j = s->second[c];
-      int32_t *const out = s->image[c] & RVE_IMAGE_FAR ? s->far : s->out;
+      const int far = s->image[c] & RVE_IMAGE_FAR;
+      int32_t *const out = far ? s->out_far : s->out, *const in = far && n->dimension == 3 ? s->in_far : s->in;
       const int swap = pass == 0 ? out[j] < out[i] : out[i] > out[j] + 1;
       if (swap) {
         int p[3];
@@ -316,16 +317,26 @@ RVE_FN void rve_balance(const RveCounts *n, RveScratch *s, int pairs) {
         s->first[c] = j, s->second[c] = i;
         s->image[c] = (uint16_t)(rve_image_pack(p) | (s->image[c] & 0xf000));
       }
-      if (pass > 0 && swap) out[i]--, s->in[j]--;
-      if (pass == 0 || swap) out[s->first[c]]++, s->in[s->second[c]]++;
+      if (pass > 0 && swap) out[i]--, in[j]--;
+      if (pass == 0 || swap) out[s->first[c]]++, in[s->second[c]]++;
     }
+}
+
+/* Largest degree among a block's grains. */
+RVE_FN int rve_most(const RveScratch *s, const int32_t *degree, int block) {
+  int most = 0;
+  for (int lane = 0; lane < RVE_PACK; lane++) {
+    const int here = degree[s->rank[block * RVE_PACK + lane]];
+    most = here > most ? here : most;
+  }
+  return most;
 }
 
 /* rank[new] = old grain, by out-degree (near, then far pairs), then in-degree, all falling; stable. place[old] = new.
  * Returns rows needed. */
 RVE_FN void rve_rank(const RveCounts *n, RveScratch *s, int *slot_rows, int *incoming_rows) {
   const int grains = n->grains, padded = n->blocks * RVE_PACK;
-  const int32_t *const key[3] = {s->in, s->far, s->out};
+  const int32_t *const key[3] = {s->in, s->out_far, s->out};
   int32_t *from = s->order, *to = s->rank;
   for (int i = 0; i < grains; i++) from[i] = i;
   for (int round = 0; round < 3; round++) { /* counting sort, least significant key first */
@@ -351,16 +362,9 @@ RVE_FN void rve_rank(const RveCounts *n, RveScratch *s, int *slot_rows, int *inc
   for (int q = 0; q < padded; q++) s->place[s->rank[q]] = q;
   *slot_rows = *incoming_rows = 0;
   for (int block = 0; block < n->blocks; block++) {
-    int out = 0, far = 0, in = 0;
-    for (int lane = 0; lane < RVE_PACK; lane++) {
-      const int i = s->rank[block * RVE_PACK + lane];
-      out = s->out[i] > out ? s->out[i] : out;
-      far = s->far[i] > far ? s->far[i] : far;
-      in = s->in[i] > in ? s->in[i] : in;
-    }
-    s->near_rows[block] = out;
-    *slot_rows += out + far;
-    *incoming_rows += in;
+    s->out_rows[block] = rve_most(s, s->out, block), s->in_rows[block] = rve_most(s, s->in, block);
+    *slot_rows += s->out_rows[block] + rve_most(s, s->out_far, block);
+    *incoming_rows += s->in_rows[block] + rve_most(s, s->in_far, block);
   }
 }
 
@@ -391,18 +395,16 @@ RVE_FN void rve_reorder(const RveCounts *n, const RveArrays *a, RveScratch *s) {
 
 /* Writes slots, histories and incoming lists of the new order. */
 RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s, int pairs) {
-  const int stride = n->row ? n->row : 1, width = n->reaction ? n->reaction / (n->dimension - 1) : 1, spins = n->dimension == 2 ? 1 : 3;
+  const int stride = n->row ? n->row : 1, width = n->reaction ? rve_reaction_width(n) : 1;
+  const int spins = n->dimension == 2 ? 1 : 3;
   int slots = 0, incoming = 0;
   for (int block = 0; block < n->blocks; block++) {
-    int far = 0, in = 0;
+    const int out = s->out_rows[block] + rve_most(s, s->out_far, block);
+    const int in = s->in_rows[block] + rve_most(s, s->in_far, block);
     a->slot_first[block] = slots, a->incoming_first[block] = incoming;
-    for (int lane = 0; lane < RVE_PACK; lane++) {
-      const int i = s->rank[block * RVE_PACK + lane];
-      far = s->far[i] > far ? s->far[i] : far;
-      in = s->in[i] > in ? s->in[i] : in;
-    }
-    const int out = s->near_rows[block] + far;
+    a->incoming_far[block] = incoming + s->in_rows[block];
     for (int row = slots; row < slots + out; row++) a->idle_until[row] = 0.0;
+    for (int row = incoming; row < incoming + in; row++) a->incoming_idle[row] = 0.0;
     for (int slot = slots * RVE_PACK; slot < (slots + out) * RVE_PACK; slot++) {
       a->neighbour[slot] = (uint32_t)((block * RVE_PACK + slot % RVE_PACK) * stride);
       a->image[slot] = RVE_IMAGE_EMPTY | RVE_IMAGE_VOID;
@@ -413,14 +415,17 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
     slots += out, incoming += in;
   }
   a->slot_first[n->blocks] = slots, a->incoming_first[n->blocks] = incoming;
-  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->far[i] = s->in[i] = 0;
+  a->idle_until[n->slot_rows] = 1e300;
+  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->out_far[i] = s->in[i] = s->in_far[i] = 0;
   for (int c = 0; c < pairs; c++) {
     const int i = s->place[s->first[c]], j = s->place[s->second[c]], old = s->history[c];
-    const int row = s->image[c] & RVE_IMAGE_FAR ? s->near_rows[i / RVE_PACK] + s->far[i]++ : s->out[i]++;
+    const int far = s->image[c] & RVE_IMAGE_FAR;
+    const int row = far ? s->out_rows[i / RVE_PACK] + s->out_far[i]++ : s->out[i]++;
     const int slot = (a->slot_first[i / RVE_PACK] + row) * RVE_PACK + i % RVE_PACK;
+    const int in = far && n->dimension == 3 ? s->in_rows[j / RVE_PACK] + s->in_far[j]++ : s->in[j]++;
     a->neighbour[slot] = (uint32_t)(j * stride);
     a->image[slot] = s->image[c] & (uint16_t)~RVE_IMAGE_FAR;
-    a->incoming[(a->incoming_first[j / RVE_PACK] + s->in[j]++) * RVE_PACK + j % RVE_PACK] =
+    a->incoming[(a->incoming_first[j / RVE_PACK] + in) * RVE_PACK + j % RVE_PACK] =
         (uint32_t)(rve_place(RVE_PACK, slot) * width);
     if (old < 0) continue;
     /* Seen from the other grain the force changes sign; in 2D the tangent (-n_y, n_x) does too. */
