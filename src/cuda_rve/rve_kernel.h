@@ -246,7 +246,7 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
 
 /* What a pass over contacts carries along. */
 typedef struct RveContactSums {
-  rve_near slid, lost;       /* of all contacts */
+  rve_near slid, lost;          /* of all contacts */
   rve_near force[3], torque[3]; /* of one block's own slots */
 } RveContactSums;
 
@@ -258,20 +258,28 @@ RVE_FN void rve_add_contact(RveFeatures ft, const RveContactPass *c, const RveCo
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) sum->torque[k] = sum->torque[k] + p.torque[k];
 }
 
-/* The rows of one block, each part of the computation for up to RVE_CHUNK of them in turn. */
+/* The rows of one block, each part of the computation for up to RVE_CHUNK of them in turn. The block's own grains are
+ * read again where they are needed: as operands from memory they take no registers. */
 RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveCounts *n,
-                               const RveArrays *a, int block, const RveNearBody *own, RveContactSums *sum) {
+                               const RveArrays *a, int block, RveContactSums *sum) {
   for (int at = a->slot_first[block]; at < a->slot_first[block + 1];) {
     RveRow row[RVE_CHUNK];
     int rows = 0;
     for (; at < a->slot_first[block + 1] && rows < RVE_CHUNK; at++) {
       if (head->approach < a->idle_until[at]) continue;
-      if (rve_meet(ft, c, a, own, at * RVE_PACK, &row[rows])) rows++;
+      const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+      if (rve_meet(ft, c, a, &own, at * RVE_PACK, &row[rows])) rows++;
       else rve_clear(ft, n, a, &row[rows]), rve_rest(head, a, &row[rows]);
     }
     if (ft.tangential || ft.viscous)
-      for (int r = 0; r < rows; r++) rve_slide(ft, c, a, own, &row[r]);
-    for (int r = 0; r < rows; r++) rve_add_contact(ft, c, n, a, own, &row[r], sum);
+      for (int r = 0; r < rows; r++) {
+        const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+        rve_slide(ft, c, a, &own, &row[r]);
+      }
+    for (int r = 0; r < rows; r++) {
+      const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+      rve_add_contact(ft, c, n, a, &own, &row[r], sum);
+    }
   }
 }
 
@@ -299,7 +307,7 @@ RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall 
     const int lane0 = block * RVE_PACK;
     const RveNearBody own = near_own_body(ft, a, lane0);
     for (int k = 0; k < 3; k++) sum.force[k] = sum.torque[k] = near_set(0.0);
-    if (RVE_CHUNK > 1 && ft.dimension == 3) rve_contact_chunks(ft, &c, head, n, a, block, &own, &sum);
+    if (RVE_CHUNK > 1 && ft.dimension == 3) rve_contact_chunks(ft, &c, head, n, a, block, &sum);
     else rve_contact_rows(ft, &c, head, n, a, block, &own, &sum);
     for (int k = 0; k < ft.dimension; k++) near_store(a->force[k], lane0, sum.force[k]);
     for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->torque[k], lane0, sum.torque[k]);
