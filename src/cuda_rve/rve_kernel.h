@@ -155,7 +155,8 @@ RVE_FN void rve_clear(RveFeatures ft, const RveCounts *n, const RveArrays *a, co
 /* Second part: relative motion, and the tangential force if nothing slid: history turned with the flow, plus the step's
  * relative motion, in the tangent plane. slide: of the surfaces, tangential (3D: only if a dashpot asks); without
  * friction, of the centres. */
-RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own, RveRow *row) {
+RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own,
+                      RveRow *row) {
   const int dim = ft.dimension;
   const rve_near half = near_set(0.5), *const n = row->n;
   const rve_near lever = own->r - half * row->overlap, other_lever = row->other.r - half * row->overlap;

@@ -79,7 +79,7 @@ typedef struct RveArrays {
   uint32_t *incoming;                   /* [incoming] slot (its place in doubles, if counts.reaction > 0) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
   int32_t *incoming_far; /* [blocks] first row that names far pairs only */
-  double *idle_until;    /* [row of slots, one more] m: no contact, forces and histories are 0, while approach is below */
+  double *idle_until;    /* [row of slots, one more] m: no contact, forces, histories are 0 while approach is below */
   double *incoming_idle; /* [row of incoming] the same for all its slots; may lag behind */
 } RveArrays;
 
