@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import pathlib
+import resource
 import shutil
 import subprocess
 import sys
@@ -28,9 +29,10 @@ THREADS = len(os.sched_getaffinity(0))
 
 @dataclasses.dataclass
 class Run:
-    """One finished run: its folder, wall seconds, and what it cost."""
+    """One finished run: its folder, wall seconds, processor seconds (user time of all its threads), and what it cost."""
     path: pathlib.Path
     seconds: float
+    processor: float
     points: int
     grains: int      # per point; 0 = continuum law
     dem_steps: int   # per packing, mean over the packings
@@ -76,14 +78,15 @@ class Study:
         command = [program, "-in", script] + [w for key, value in variables.items() for w in ("-var", key, *value)]
         if ranks > 1:
             command = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks), *command]
-        start = time.monotonic()
+        start, used = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         with open(path / "screen", "w") as screen:
             code = subprocess.run([str(word) for word in command], cwd=path, env=environment(max(threads // ranks, 1)),
                                   stdin=subprocess.DEVNULL, stdout=screen, stderr=subprocess.STDOUT, timeout=timeout).returncode
         if code != 0:
             tail = "\n".join((path / "screen").read_text(errors="replace").splitlines()[-8:])
             raise RuntimeError(f"{self.case}: {name} ended with {code}\n{tail}")
-        done = {"wanted": wanted, "seconds": round(time.monotonic() - start, 2)}
+        used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
+        done = {"wanted": wanted, "seconds": round(time.monotonic() - start, 2), "processor": round(used, 2)}
         mark.write_text(json.dumps(done))
         return self.read(path, done, grains)
 
@@ -93,7 +96,7 @@ class Study:
         points = int(thermo[-1]["Atoms"][0]) if thermo and "Atoms" in thermo[-1] else 0
         particle_steps = thermo[-1].get("mpm[12]", [0])[-1] if thermo else 0
         dem_steps = round(particle_steps / (points * grains)) if points and grains else 0
-        return Run(path, done["seconds"], points, grains, dem_steps, thermo)
+        return Run(path, done["seconds"], done.get("processor", 0.0), points, grains, dem_steps, thermo)
 
     def check(self, quantity, error, bound, run, seconds=None):
         """error <= bound passes; both in the unit that the quantity's name tells. bound None: for information."""
@@ -117,14 +120,14 @@ class Study:
         plt.close(figure)
         self.figures.append(path.name)
 
-    def pack(self, name, **settings):
+    def pack(self, name, threads=THREADS, **settings):
         """A packing by dempm-pack, made once; its path."""
         path = self.folder / f"{name}.packing"
         words = [word for key, value in settings.items() for word in (key, *(value if isinstance(value, tuple) else (value,)))]
         mark = path.with_suffix(".made")
         if not (path.exists() and mark.exists() and mark.read_text() == str(words)):
             subprocess.run([str(w) for w in (BUILD / "dempm-pack", "generate", path, *words)], check=True, stdout=subprocess.PIPE,
-                           env=environment(THREADS))
+                           env=environment(threads))
             mark.write_text(str(words))
         return path
 
