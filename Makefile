@@ -50,7 +50,7 @@ ALL_LIBS = -lliggghts $(VTK_LIBS) $(C_LIBS)
 
 # -------------------------------------------------------------------------------------------------------------- sources
 C_SOURCES := $(filter-out %_main.c %/rve_backend_cpu.c,$(wildcard src/base/*.c src/mpm/*.c src/cuda_rve/*.c \
-               src/grain_heat/*.c))
+               src/grain_heat/*.c src/grain_bond/*.c))
 MPI_SOURCES := $(wildcard src/fix_mpm_couple/*.c)
 CXX_SOURCES := $(filter-out %/main.cpp,$(wildcard src/fix_mpm_couple/*.cpp))
 CU_SOURCES := $(if $(NVCC),$(wildcard src/cuda_rve/*.cu))

@@ -45,6 +45,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void pre_delete(bool);
   int n_history_extra();
   bool history_args(char **);
+  /* With `friction`: the tangential spring at the head of a contact's history was set, not grown by slip. */
+  void start_slip(double *history) const;
 
  private:
   enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, FLOWS };

@@ -86,6 +86,12 @@ void FixHeatGranGrain::slip(int i, int j, double *history) {
   for (int a = 0; a < 3; a++) before[a] = history[a];
 }
 
+void FixHeatGranGrain::start_slip(double *history) const {
+  if (!friction_) return;
+  double *before = history + pair_gran->fix_extra_dnum_index(const_cast<FixHeatGranGrain *>(this));
+  for (int a = 0; a < 3; a++) before[a] = history[a];
+}
+
 void FixHeatGranGrain::heat_by_friction() {
   const NeighList *list = pair_gran->list;
   for (int n = 0; n < list->inum; n++) {

@@ -7,6 +7,8 @@
 #include <string>
 
 #include "fix.h"
+#include "fix_bond_gran_thermal.h"
+#include "fix_expansion_gran.h"
 #include "fix_heat_gran_grain.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
@@ -68,6 +70,8 @@ void LAMMPS_NS::register_styles(LAMMPS *lmp) {
   std::map<std::string, FixCreator> &map = *(lmp->modify->*member_of(FixMap()));
 #define FIX_CLASS
 #define FixStyle(key, Class) map[#key] = &create<Class>;
+#include "fix_bond_gran_thermal.h"
+#include "fix_expansion_gran.h"
 #include "fix_heat_gran_grain.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"

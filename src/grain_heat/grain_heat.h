@@ -123,6 +123,9 @@ double grain_heat_reach(const GrainHeat *model, double radius);
 typedef struct GrainMotion {
   double radius[2], branch[3], velocity[2][3], spin[2][3];
 } GrainMotion;
+/* Unit normal from grain 1 to grain 0, and the tangential velocity of the surface of grain 0 relative to that of grain 1 at
+ * the point of contact, m/s. distance: |branch|, > 0. Returns the speed at which the centres move apart, m/s. */
+double grain_tangential_velocity(const GrainMotion *motion, double distance, double normal[3], double velocity[3]);
 /* Work of friction in a step of duration `step`, J. The tangential spring, of the given stiffness (N/m), goes from
  * `before` by the grains' motion to a trial state, which the Coulomb limit shortens to `after`, m: mean force times
  * slip; 0 where the limit is not reached. That is what velocity Verlet takes from the grains' motion and does not

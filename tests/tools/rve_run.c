@@ -3,7 +3,9 @@
  *
  *   rve_run PACKING DIMENSION keyword value ...
  *
- * Scene: grain disk|sphere  thickness  density  kn  kt  mu  gamman  gammat  viscous  local  dt  fraction.
+ * Scene: grain disk|sphere  thickness  density  kn  kt  mu  gamman  gammat  viscous  local  rotation  dt  fraction.
+ * Heat and bonds: expansion  reference  bond_strength (bonds all contacts at the start)  bond_shear_ratio  bond_melting
+ *      temperature T (of the end, by equal parts from the reference; see the end of this head).
  * Run: L xx xy xz yx ... zz (velocity gradient)  steps N  every N (a line of figures each; 0: only the last)
  *      copies NX NY NZ (of the packing, side by side)
  *      verlet 1 (see below)  kick N VX VY VZ (the first N grains get this velocity added after the run, which is then
@@ -14,7 +16,10 @@
  * leapfrog keeps them half a step behind the positions. Both integrators are the same: v(n+1/2) = v(n) + dt/2 a(n), x(n+1) =
  * x(n) + dt v(n+1/2), and LIGGGHTS too evaluates forces, dashpots included, with the velocities of the half step. Only the
  * first force differs: LIGGGHTS takes it from v(0). Hence a start u = v(-1/2) is sought whose first step ends in
- * v(1/2) = v(0) + dt/2 a(x(0), v(0)); at the end v(n) is the mean of v(n-1/2) and v(n+1/2). */
+ * v(1/2) = v(0) + dt/2 a(x(0), v(0)); at the end v(n) is the mean of v(n-1/2) and v(n+1/2).
+ *
+ * temperature: step k is computed at reference + (k - 1) parts, as in LIGGGHTS, where grains have in each step the temperature
+ * that the step before left. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -29,7 +34,7 @@ typedef struct Run {
   RveInput input;
   int64_t steps, every;
   int verlet, kicked, copies[3];
-  double kick[3];
+  double kick[3], temperature;
   const char *grains;
 } Run;
 
@@ -56,7 +61,7 @@ static double number(const char *text) {
 
 static void parse(char **text, Run *run) {
   RveScene *s = &run->scene;
-  double steps = 0.0, every = 0.0, verlet = 0.0, kick[4] = {0.0}, copies[3] = {1.0, 1.0, 1.0};
+  double rotation = 1.0, steps = 0.0, every = 0.0, verlet = 0.0, kick[4] = {0.0}, copies[3] = {1.0, 1.0, 1.0};
   const Keyword table[] = {{"thickness", &s->thickness, 1},
                            {"density", &s->density, 1},
                            {"kn", &s->normal_stiffness, 1},
@@ -66,6 +71,13 @@ static void parse(char **text, Run *run) {
                            {"gammat", &s->tangential_viscosity, 1},
                            {"viscous", &s->critical_damping, 1},
                            {"local", &s->local_damping, 1},
+                           {"rotation", &rotation, 1},
+                           {"expansion", &s->expansion, 1},
+                           {"reference", &s->reference_temperature, 1},
+                           {"temperature", &run->temperature, 1},
+                           {"bond_strength", &s->bond_strength, 1},
+                           {"bond_shear_ratio", &s->bond_shear_ratio, 1},
+                           {"bond_melting", &s->bond_melting_temperature, 1},
                            {"dt", &s->time_step, 1},
                            {"fraction", &s->time_step_fraction, 1},
                            {"L", run->input.velocity_gradient, 9},
@@ -89,6 +101,10 @@ static void parse(char **text, Run *run) {
       exit(1);
     }
   }
+  s->rotation = rotation != 0.0;
+  s->bonds = s->bond_strength > 0.0;
+  s->thermal = !isnan(s->expansion);
+  if (s->thermal) s->pipe_resistance = 1.0; /* not asked for */
   run->steps = (int64_t)steps, run->every = every > 0.0 ? (int64_t)every : (int64_t)steps;
   run->verlet = verlet != 0.0, run->kicked = (int)kick[0];
   memcpy(run->kick, kick + 1, sizeof run->kick);
@@ -98,15 +114,26 @@ static void parse(char **text, Run *run) {
 static RveBatch *create(const Run *run, const RvePacking *packing) {
   RveBatch *batch;
   must(rve_batch_create(&run->scene, packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch));
+  if (run->scene.bonds) must(rve_batch_install_bonds(batch, 0, NULL));
   return batch;
+}
+
+/* The state that is wanted after `step` steps. */
+static RveInput input_at(const Run *run, int64_t step) {
+  RveInput input = run->input;
+  const double reference = run->scene.reference_temperature;
+  if (run->scene.thermal)
+    input.temperature = reference + (run->temperature - reference) * (double)(step > 0 ? step - 1 : 0) / (double)run->steps;
+  return input;
 }
 
 /* Velocities and spins after one step from `packing`. */
 static RvePacking one_step(const Run *run, const RvePacking *packing) {
   RveBatch *batch = create(run, packing);
+  const RveInput input = input_at(run, 1);
   RveAnswer answer;
   RvePacking after;
-  must(rve_batch_step(batch, 1, NULL, &run->input, run->scene.time_step, &answer));
+  must(rve_batch_step(batch, 1, NULL, &input, run->scene.time_step, &answer));
   must(rve_batch_packing(batch, 0, &after));
   rve_batch_destroy(batch);
   return after;
@@ -136,9 +163,10 @@ static void half_step_back(const Run *run, RvePacking *packing) {
 
 /* Half-step velocities of `packing`, the present state of `batch`, to those of the whole step, through one step more. */
 static void half_step_on(const Run *run, RveBatch *batch, RvePacking *packing) {
+  const RveInput input = input_at(run, run->steps + 1);
   RveAnswer answer;
   RvePacking after;
-  must(rve_batch_step(batch, 1, NULL, &run->input, run->scene.time_step, &answer));
+  must(rve_batch_step(batch, 1, NULL, &input, run->scene.time_step, &answer));
   must(rve_batch_packing(batch, 0, &after));
   for (int k = 0; k < 3 * packing->grains; k++) {
     packing->velocity[k] = 0.5 * (packing->velocity[k] + after.velocity[k]);
@@ -150,27 +178,31 @@ static void half_step_on(const Run *run, RveBatch *batch, RvePacking *packing) {
 static void print_answer(const RveAnswer *a) {
   printf("%lld", (long long)a->steps);
   for (int k = 0; k < 6; k++) printf(" %.12g", a->stress[k]);
-  printf(" %.12g %.12g %.12g %.12g %.6g %.6g %.12g %.9g\n", a->kinetic_energy, a->elastic_energy, a->friction_work,
-         a->damping_work, a->coordination, a->unbalanced, a->volume, a->solid_fraction);
+  printf(" %.12g %.12g %.12g %.12g %.6g %.6g %.12g %.9g %.12g\n", a->kinetic_energy, a->elastic_energy, a->friction_work,
+         a->damping_work, a->coordination, a->unbalanced, a->volume, a->solid_fraction,
+         a->bond_fraction);
 }
 
 /* From packing to packing; returns 0 if the RVE became unstable. */
 static int advance(const Run *run, RvePacking *packing) {
   if (run->verlet) half_step_back(run, packing);
   RveBatch *batch = create(run, packing);
+  RveInput input = input_at(run, 0);
   RveAnswer answer;
-  must(rve_batch_step(batch, 1, NULL, &run->input, 0.0, &answer));
+  must(rve_batch_step(batch, 1, NULL, &input, 0.0, &answer));
   print_answer(&answer);
-  for (int64_t done = 0; done < run->steps; done += run->every) {
-    const int64_t next = run->steps - done < run->every ? run->steps - done : run->every;
-    const BaseStatus status = rve_batch_step(batch, 1, NULL, &run->input, (double)next * run->scene.time_step, &answer);
+  for (int64_t done = 0, next; done < run->steps; done += next) {
+    next = run->scene.thermal && done == 0 ? 1 : run->every - done % run->every;
+    if (next > run->steps - done) next = run->steps - done;
+    input = input_at(run, done + next);
+    const BaseStatus status = rve_batch_step(batch, 1, NULL, &input, (double)next * run->scene.time_step, &answer);
     if (status == BASE_ERROR_UNSTABLE) {
       printf("unstable between steps %lld and %lld\n", (long long)done, (long long)(done + next));
       rve_batch_destroy(batch);
       return 0;
     }
     must(status);
-    print_answer(&answer);
+    if ((done + next) % run->every == 0 || done + next == run->steps) print_answer(&answer);
   }
   rve_packing_destroy(packing);
   must(rve_batch_packing(batch, 0, packing));
@@ -211,7 +243,7 @@ int main(int count, char **text) {
   if (run.scene.time_step == 0.0)
     run.scene.time_step = run.scene.time_step_fraction * rve_critical_time_step(&run.scene, &packing);
   printf("# time step %.17g s, critical %.17g s\n", run.scene.time_step, rve_critical_time_step(&run.scene, &packing));
-  printf("# step sxx syy szz sxy sxz syz [Pa] kinetic elastic friction damping [J] coordination unbalanced volume solid\n");
+  printf("# step sxx syy szz sxy sxz syz [Pa] kinetic elastic friction damping [J] coordination unbalanced volume solid bonds\n");
   int stable = advance(&run, &packing);
   if (stable && run.kicked > 0) {
     for (int i = 0; i < run.kicked && i < packing.grains; i++)

@@ -9,7 +9,7 @@ import subprocess
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("DEMPM_BUILD", ROOT / "build"))
 COLUMNS = ["step", "sxx", "syy", "szz", "sxy", "sxz", "syz", "kinetic", "elastic", "friction", "damping",
-           "coordination", "unbalanced", "volume", "solid"]
+           "coordination", "unbalanced", "volume", "solid", "bonds"]
 
 
 class Packing:
