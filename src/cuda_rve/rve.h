@@ -9,6 +9,7 @@
 #define DEMPM_RVE_H
 
 #include "../base/base.h"
+#include "../grain_heat/grain_heat.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -40,7 +41,16 @@ typedef struct RveScene {
   int thermal;                /* 1: grains expand, conductivity is computed; 0: the variant without heat runs */
   double expansion;           /* beta, 1/K, linear (eq. 37). Required if thermal */
   double reference_temperature; /* at which the packing's radii hold; same scale as the temperatures passed */
-  double pipe_resistance;     /* alpha, K/(W m), resistance of a heat pipe per length: h = 1/(alpha |l|). Required if thermal */
+  double pipe_resistance;     /* alpha, K/(W m), resistance of a heat pipe per length: h = 1/(alpha |l|). Required if thermal without
+                                 a conduction model */
+  GrainHeat conduction;       /* one direct and one indirect model in place of heat pipes (not collisional); h is that of spheres, also
+                                 of disks. Default: neither */
+  double grain_conductivity;  /* W/(m K), of the grains' matter; required with a conduction model */
+  int network;                /* 0: conductivity of affine temperatures (default); 1: of the temperatures that the contacts bring about */
+  double network_change;      /* the network is solved again when the affine conductivity has changed by more than this fraction (Frobenius),
+                                 or the packing was deformed and turned by more (integral of |L| dt); in between it is carried along with
+                                 the affine one. 0: in each call. Default 0.01 */
+  int conductivity_every;     /* conductivities are worked out in every N-th call with a duration, and stand in between. Default 1 */
   double grain_heat_capacity; /* J/(kg K); used by rve_batch_conduct() only. Required there */
 
   int bonds;                  /* 1: bonds can exist (installed by rve_batch_install_bonds) */
@@ -96,7 +106,8 @@ typedef struct RveInput {
 
 typedef struct RveAnswer {
   double stress[6];       /* Cauchy, Pa: -(1/V)[sum f (x) b + sum m v_f (x) v_f], symmetrised (eq. 49 corrected) */
-  double conductivity[6]; /* W/(m K): (1/V) sum h l (x) l (eq. 34 corrected); 0 if !thermal */
+  double conductivity[6]; /* W/(m K): (1/V) sum h l (x) l (eq. 34 corrected), or that of the network; 0 if !thermal */
+  double conductivity_affine[6]; /* W/(m K): the affine sum, an upper bound of the network's, whatever the scene asks for */
   double heat;            /* frictional heat per current volume and time of the MPM step, W/m3 (eq. 32-33 corrected) */
   double friction_work;   /* total slip work since creation, J per RVE */
   double solid_fraction;  /* sum of grain areas (2D: pi R^2) or volumes over the cell's, overlaps not removed */
@@ -142,6 +153,9 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
  * last bit). Restored RVEs count as having histories of their own. */
 int64_t rve_batch_shared(const RveBatch *batch);
 
+/* Conductivities that were asked of the network since creation: by solving it, and carried along from an earlier solution. */
+void rve_batch_network_counts(const RveBatch *batch, int64_t *solved, int64_t *kept);
+
 /* Bonds every contact with overlap > 0 of the given RVEs (NULL: all). Requires scene.bonds. */
 BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index);
 /* Sets fluctuation velocities and spins to zero, e.g. after consolidation. */
@@ -176,8 +190,8 @@ void rve_view_destroy(RveView *view);
 BaseStatus rve_batch_packing(const RveBatch *batch, int rve, RvePacking *packing);
 
 /* Heat conduction between the grains themselves at fixed geometry, `steps` explicit steps of `time_step` s:
- * m c dT_i/dt = sum_c h_c (T_j - T_i), h = 1/(alpha |l|). temperature [grains] in and out. For verification A11 and for
- * network conductivities. BASE_ERROR_ARGUMENT if time_step exceeds min m c / sum h. */
+ * m c dT_i/dt = sum_c h_c (T_j - T_i), h = 1/(alpha |l|) or that of the conduction model. temperature [grains] in and out. For
+ * verification A11. BASE_ERROR_ARGUMENT if time_step exceeds min m c / sum h. */
 BaseStatus rve_batch_conduct(const RveBatch *batch, int rve, double time_step, int64_t steps, double *temperature);
 
 /* Critical DEM time step of a packing, s: min over grains of 2 sqrt(m / (kn W)), W bounding the contact stiffness matrix

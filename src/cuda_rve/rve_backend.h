@@ -32,6 +32,7 @@ typedef struct RveDeviceJob {
   int pairs;   /* candidate pairs to have room for */
   int outcome; /* out: RveOutcome */
   RveCall call;
+  RveInput input; /* of the call, for the host */
   double work_before, duration;
   RveAnswer answer; /* in: the last one; out */
 } RveDeviceJob;
@@ -44,6 +45,15 @@ BaseStatus rve_device_download(RveDevice *device, int rve, void *arena);
 /* Runs and measures all jobs. */
 BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count);
 
+/* What an RVE remembers of its conductivity (rve_conduction.h). 8-byte members only: it is stored as it is. */
+typedef struct RveConduction {
+  double tensor[6], affine[6];                  /* of the last answer, W/(m K) */
+  double solved_affine[6], solved_network[6];   /* when the network was solved */
+  double path;                                  /* integral of |L| dt since then */
+  int64_t has_solution;
+  int64_t age; /* calls since the last answer was worked out; -1: there is none */
+} RveConduction;
+
 /* One RVE on the host. */
 typedef struct RveRecord {
   RveCounts counts;
@@ -51,9 +61,10 @@ typedef struct RveRecord {
   void *arena; /* on the host; with a device: a copy that may be old */
   size_t bytes;
   RveAnswer last;
+  RveConduction conduction;
 } RveRecord;
 
-/* rve_state.c, rve_restart.c, rve_view.c */
+/* rve_state.c, rve_restart.c, rve_view.c, rve_conduction.c */
 BaseStatus rve_record_from_packing(const RveKernels *kernels, const RveScene *scene, const RvePacking *packing,
                                    RveRecord *record);
 void rve_record_destroy(RveRecord *record);

@@ -55,16 +55,28 @@ static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const Rve
   }
 }
 
-static void measure_record(const RveBatch *batch, RveRecord *record, const RveCall *call, double work_before,
-                           double duration) {
+static const RveInput nothing = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0};
+
+/* After the kernels' measure. A network without solution fails the RVE, as every answer that is not a number. */
+static BaseStatus answer_conduction(const RveBatch *batch, RveRecord *record, const RveInput *input, double duration,
+                                    RveWorkspace *workspace) {
+  const BaseStatus status =
+      rve_conduction_answer(record, &batch->scene, input, duration, &workspace->conduction);
+  if (status != BASE_ERROR_UNSTABLE) return status;
+  rve_head(record->arena)->failed = record->last.status = BASE_ERROR_UNSTABLE;
+  return BASE_OK;
+}
+
+static BaseStatus measure_record(const RveBatch *batch, RveRecord *record, const RveCall *call, double work_before,
+                                 const RveInput *input, double duration, RveWorkspace *workspace) {
   RveHead *head = rve_head(record->arena);
   if (!head->failed)
     batch->kernels->measure(batch->features, call, record->arena, &record->counts, work_before, duration,
                             &record->last);
+  if (!head->failed) TRY(answer_conduction(batch, record, input, duration, workspace));
   if (head->failed) record->last.status = BASE_ERROR_UNSTABLE;
+  return BASE_OK;
 }
-
-static const RveInput nothing = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0};
 
 /* Lists and forces of the present state, without time passing and without work done; then the answer. */
 static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, RveWorkspace *workspace) {
@@ -75,8 +87,7 @@ static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, RveWo
   TRY(run_record(batch, record, &call, workspace));
   head = rve_head(record->arena);
   head->friction_work = friction, head->damping_work = damping;
-  measure_record(batch, record, &call, friction, 0.0);
-  return BASE_OK;
+  return measure_record(batch, record, &call, friction, &nothing, 0.0, workspace);
 }
 
 static BaseStatus step_record(RveBatch *batch, int rve, const RveInput *input, double duration,
@@ -92,7 +103,7 @@ static BaseStatus step_record(RveBatch *batch, int rve, const RveInput *input, d
   workspace->kept = batch->keep && rve_may_fail(batch, record, &call);
   if (workspace->kept) TRY(rve_keep_before(record, workspace));
   if (call.steps > 0) TRY(run_record(batch, record, &call, workspace));
-  measure_record(batch, record, &call, work_before, duration);
+  TRY(measure_record(batch, record, &call, work_before, input, duration, workspace));
   return rve_head(record->arena)->failed ? rve_note_failure(batch, rve, &call, input, duration, workspace) : BASE_OK;
 }
 
@@ -204,6 +215,7 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
     memcpy(to->arena, from->arena, from->bytes);
     to->counts = from->counts;
     to->bytes = from->bytes;
+    rve_conduction_forget(&to->conduction);
     rve_layout(&to->counts, to->arena, &to->arrays);
   }
   TRY_GOTO(refresh(batch, count, NULL), status, failed);
@@ -230,6 +242,7 @@ void rve_batch_destroy(RveBatch *batch) {
   for (int k = 0; k < batch->threads; k++) {
     base_free(batch->workspace[k].memory);
     base_free(batch->workspace[k].before.arena);
+    rve_network_destroy(&batch->workspace[k].conduction.network);
   }
   rve_device_destroy(batch->device);
   base_free(batch->workspace);
@@ -268,6 +281,14 @@ static BaseStatus check_input(const RveBatch *batch, int n, const RveInput *inpu
   return BASE_OK;
 }
 
+/* Conductivities that the kernels do not know are the host's: the state comes back for them. */
+static BaseStatus device_conduction(RveBatch *batch, int rve, const RveInput *input, double duration) {
+  RveRecord *record = &batch->record[rve];
+  if (record->last.status != BASE_OK) return BASE_OK;
+  if (rve_conduction_is_own(&batch->scene)) TRY(download(batch, rve));
+  return answer_conduction(batch, record, input, duration, &batch->workspace[0]);
+}
+
 /* One launch runs all jobs; those whose arena was too small grow on the host and go on. */
 static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
   int count = 0;
@@ -279,6 +300,7 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
     memset(job, 0, sizeof *job);
     TRY(rve_call_make(&batch->scene, head, input ? &input[k] : &nothing, duration, &job->call));
     job->rve = rve;
+    if (input) job->input = input[k];
     job->refresh = input == NULL;
     job->pairs = pairs_for(&batch->record[rve]);
     job->work_before = batch->record[rve].last.friction_work;
@@ -303,6 +325,7 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
       record->last = job->answer;
       rve_head(record->arena)->failed = record->last.status;
       rve_head(record->arena)->temperature = job->call.temperature;
+      TRY(device_conduction(batch, job->rve, input ? &job->input : &nothing, duration));
       if (!record->last.status || !input) continue;
       TRY(download(batch, job->rve));
       rve_head(record->arena)->failed = record->last.status;
@@ -341,6 +364,14 @@ static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveI
   rve_twins_renew(batch, n);
   batch->shared += copied;
   return first;
+}
+
+void rve_batch_network_counts(const RveBatch *batch, int64_t *solved, int64_t *kept) {
+  *solved = *kept = 0;
+  for (int k = 0; k < batch->threads; k++) {
+    *solved += batch->workspace[k].conduction.solved;
+    *kept += batch->workspace[k].conduction.kept;
+  }
 }
 
 int64_t rve_batch_shared(const RveBatch *batch) { return batch->shared; }
@@ -389,6 +420,8 @@ BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
     rve_packing_destroy(&packing);
     TRY(upload(batch, k));
   }
+  if (!rve_conduction_is_same(scene, old))
+    for (int k = 0; k < batch->count; k++) rve_conduction_forget(&batch->record[k].conduction);
   batch->scene = *scene;
   batch->features = rve_scene_features(scene);
   TRY(set_threads(batch));

@@ -3,7 +3,7 @@
 #ifndef DEMPM_RVE_BATCH_PRIVATE_H
 #define DEMPM_RVE_BATCH_PRIVATE_H
 
-#include "rve_backend.h"
+#include "rve_conduction.h"
 #include "rve_replay.h"
 
 typedef struct RveWorkspace { /* one thread's */
@@ -12,6 +12,7 @@ typedef struct RveWorkspace { /* one thread's */
   RveRecord before; /* the RVE as it was before the call, if kept = 1; its arena has room for `room` bytes */
   size_t room;
   int kept;
+  RveConductionWork conduction;
 } RveWorkspace;
 
 /* All about a failed RVE. */

@@ -73,8 +73,9 @@ typedef struct ElementState {
 } ElementState;
 /* Deepest overlap of RVE 0, over the smaller radius; unchanged if it has failed: its grains may be anywhere then. */
 BaseStatus element_overlap(const RveBatch *batch, double *overlap);
-void element_table_head(FILE *out, int dimension, int thermal);
-void element_table_line(FILE *out, int dimension, int thermal, const ElementState *state);
+/* Which columns there are follows from the scene. */
+void element_table_head(FILE *out, const RveScene *scene);
+void element_table_line(FILE *out, const RveScene *scene, const ElementState *state);
 
 typedef struct ElementFigures { /* of a whole run */
   double seconds;               /* wall time in the engine */

@@ -21,6 +21,8 @@ static const char usage[] =
     "           simple-shear\n"
     "  --set    required: density kn kt mu thickness (2D); of paths: pressure rate strain duration start\n"
     "           optional: grain gamman gammat damping/local damping/viscous rotation precision expansion Tref alpha\n"
+    "           direct area indirect fluid porosity core reach layer minimum_gap grain_conductivity\n"
+    "           conductivity network_change conductivity_every\n"
     "           bond_strength bond_shear_ratio bond_melting timestep timestep_fraction substeps skin threads\n"
     "           backend servo_rate servo_steps stress_tolerance approach_steps\n"
     "  --every N     a line of the answer every N DEM steps (else 200 lines)\n"
@@ -176,6 +178,10 @@ static void report(const Arguments *a, const RvePacking *packing, const RveBatch
   printf("overlap          at most %.3g of the smaller radius%s\n", f->worst_overlap,
          f->worst_overlap > 0.3 ? ": more than linear contacts are meant for (0.3)" : "");
   printf("answer           %s: %d lines\n", a->out, f->lines);
+  int64_t solved, kept;
+  rve_batch_network_counts(batch, &solved, &kept);
+  if (solved > 0)
+    printf("conductivity     networks: %lld solved, %lld carried along\n", (long long)solved, (long long)kept);
   printf("backend          %s, %d %s\n", rve_batch_backend_name(batch), rve_batch_count(batch),
          rve_batch_count(batch) == 1 ? "copy" : "copies");
   printf("speed            %.4g particle-steps in %.3f s: %.4g particle-steps/s\n", f->particle_steps, f->seconds,
@@ -255,7 +261,7 @@ static BaseStatus replay_line(FILE *out, const RveReplay *replay, const RveBatch
   memcpy(state.gradient, gradient, sizeof state.gradient);
   TRY(element_overlap(batch, overlap));
   state.overlap = *overlap;
-  element_table_line(out, replay->scene.dimension, replay->scene.thermal, &state);
+  element_table_line(out, &replay->scene, &state);
   return BASE_OK;
 }
 
@@ -268,7 +274,7 @@ static BaseStatus replay_slowly(const RveReplay *replay, RveBatch *batch, int64_
   double gradient[9], overlap = 0.0;
   const double duration = replay->duration / (double)steps;
   if (every == 0) every = steps > 1000 ? steps / 1000 : 1;
-  element_table_head(out, replay->scene.dimension, replay->scene.thermal);
+  element_table_head(out, &replay->scene);
   for (int64_t k = 1; k <= steps && status == BASE_OK; k++) {
     status = rve_batch_step(batch, 1, NULL, &input, duration, &answer);
     tensor_exponential(input.velocity_gradient, duration * (double)k, gradient);

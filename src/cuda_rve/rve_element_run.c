@@ -105,7 +105,7 @@ static BaseStatus write_line(Driver *d) {
   TRY(element_overlap(d->batch, &d->overlap));
   state.overlap = d->overlap;
   d->figures->worst_overlap = fmax(d->figures->worst_overlap, d->overlap);
-  element_table_line(d->run->out, d->scene->dimension, d->scene->thermal, &state);
+  element_table_line(d->run->out, d->scene, &state);
   d->figures->lines++;
   return BASE_OK;
 }
@@ -325,7 +325,7 @@ static BaseStatus run_path(Driver *d) {
   d->damping = d->answer[0].damping_work;
   if (d->scene->thermal && !isnan(path->row[0].temperature) && path->row[0].temperature != d->temperature)
     TRY(call(d, still, path->row[0].temperature, d->time_step));
-  element_table_head(d->run->out, d->scene->dimension, d->scene->thermal);
+  element_table_head(d->run->out, d->scene);
   TRY(write_line(d));
   const double whole = path->row[path->rows - 1].time;
   const int by_steps = d->run->every > 0 && d->scene->substeps == 0;

@@ -6,19 +6,20 @@
 
 #include "rve_element.h"
 
-typedef enum SettingKind { SETTING_REAL, SETTING_INTEGER, SETTING_FLAG, SETTING_GRAIN, SETTING_BACKEND, SETTING_PRECISION } SettingKind;
+typedef enum SettingKind { SETTING_REAL, SETTING_INTEGER, SETTING_CHOICE } SettingKind;
 typedef enum SettingRange { ANY, POSITIVE, NOT_NEGATIVE, BELOW_ONE, UP_TO_ONE, AT_LEAST_ONE } SettingRange;
 
 typedef struct Setting {
   const char *name;
   SettingKind kind;
   SettingRange range;
-  void *value;
+  void *value;              /* double, int, or an int or enum that counts the words of a choice */
+  const char *const *words; /* of a choice, NULL at the end */
   const char *paths; /* built-in paths that use it; NULL: no matter of paths */
   int given;
 } Setting;
 
-enum { MOST_SETTINGS = 48 };
+enum { MOST_SETTINGS = 64 };
 typedef struct Table {
   int count;
   Setting setting[MOST_SETTINGS];
@@ -47,6 +48,7 @@ ElementSettings element_settings_default(int dimension) {
   settings.scene = rve_scene_default();
   settings.scene.dimension = dimension;
   settings.scene.grain = dimension == 2 ? RVE_DISK : RVE_SPHERE;
+  settings.scene.conduction.fluid = NAN;
   settings.scene.reference_temperature = settings.scene.bond_strength = NAN;
   settings.backend = RVE_BACKEND_CPU;
   settings.pressure = settings.start = settings.duration = settings.rate = settings.strain = NAN;
@@ -58,10 +60,39 @@ ElementSettings element_settings_default(int dimension) {
 }
 
 static void add(Table *table, const char *name, SettingKind kind, SettingRange range, void *value, const char *paths) {
-  table->setting[table->count++] = (Setting){name, kind, range, value, paths, 0};
+  table->setting[table->count++] = (Setting){name, kind, range, value, NULL, paths, 0};
 }
 static void add_real(Table *table, const char *name, SettingRange range, double *value) {
   add(table, name, SETTING_REAL, range, value, NULL);
+}
+
+static void add_choice(Table *table, const char *name, const char *const *words, void *value) {
+  table->setting[table->count++] = (Setting){name, SETTING_CHOICE, ANY, value, words, NULL, 0};
+}
+
+/* In the order of their enumerations. */
+static const char *const flags[] = {"no", "yes", NULL}, *const grains[] = {"disk", "sphere", NULL},
+                         *const backends[] = {"auto", "cpu", "cuda", NULL},
+                         *const precisions[] = {"double", "mixed", NULL},
+                         *const directs[] = {"none", "batchelor", "liggghts", "pipe", NULL},
+                         *const indirects[] = {"none", "voronoi_a", "voronoi_b", "layer", NULL},
+                         *const areas[] = {"geometric", "hertz", NULL}, *const networks[] = {"affine", "network", NULL};
+
+static void add_conduction(RveScene *scene, Table *table) {
+  GrainHeat *model = &scene->conduction;
+  add_choice(table, "direct", directs, &model->direct);
+  add_choice(table, "area", areas, &model->area);
+  add_choice(table, "indirect", indirects, &model->indirect);
+  add_real(table, "fluid", POSITIVE, &model->fluid);
+  add_real(table, "porosity", BELOW_ONE, &model->porosity);
+  add_real(table, "core", BELOW_ONE, &model->core);
+  add_real(table, "reach", POSITIVE, &model->reach);
+  add_real(table, "layer", POSITIVE, &model->layer);
+  add_real(table, "minimum_gap", POSITIVE, &model->minimum_gap);
+  add_real(table, "grain_conductivity", POSITIVE, &scene->grain_conductivity);
+  add_choice(table, "conductivity", networks, &scene->network);
+  add_real(table, "network_change", NOT_NEGATIVE, &scene->network_change);
+  add(table, "conductivity_every", SETTING_INTEGER, AT_LEAST_ONE, &scene->conductivity_every, NULL);
 }
 
 static void fill_table(ElementSettings *s, Table *table) {
@@ -72,15 +103,16 @@ static void fill_table(ElementSettings *s, Table *table) {
   add_real(table, "kt", NOT_NEGATIVE, &scene->tangential_stiffness);
   add_real(table, "mu", NOT_NEGATIVE, &scene->friction);
   add_real(table, "thickness", POSITIVE, &scene->thickness);
-  add(table, "grain", SETTING_GRAIN, ANY, &scene->grain, NULL);
+  add_choice(table, "grain", grains, &scene->grain);
   add_real(table, "gamman", NOT_NEGATIVE, &scene->normal_viscosity);
   add_real(table, "gammat", NOT_NEGATIVE, &scene->tangential_viscosity);
   add_real(table, "damping/local", BELOW_ONE, &scene->local_damping);
   add_real(table, "damping/viscous", NOT_NEGATIVE, &scene->critical_damping);
-  add(table, "rotation", SETTING_FLAG, ANY, &scene->rotation, NULL);
+  add_choice(table, "rotation", flags, &scene->rotation);
   add_real(table, "expansion", NOT_NEGATIVE, &scene->expansion);
   add_real(table, "Tref", ANY, &scene->reference_temperature);
   add_real(table, "alpha", POSITIVE, &scene->pipe_resistance);
+  add_conduction(scene, table);
   add_real(table, "bond_strength", NOT_NEGATIVE, &scene->bond_strength);
   add_real(table, "bond_shear_ratio", NOT_NEGATIVE, &scene->bond_shear_ratio);
   add_real(table, "bond_melting", ANY, &scene->bond_melting_temperature);
@@ -89,8 +121,8 @@ static void fill_table(ElementSettings *s, Table *table) {
   add(table, "substeps", SETTING_INTEGER, NOT_NEGATIVE, &scene->substeps, NULL);
   add_real(table, "skin", UP_TO_ONE, &scene->skin);
   add(table, "threads", SETTING_INTEGER, AT_LEAST_ONE, &scene->threads, NULL);
-  add(table, "backend", SETTING_BACKEND, ANY, &s->backend, NULL);
-  add(table, "precision", SETTING_PRECISION, ANY, &scene->mixed, NULL);
+  add_choice(table, "backend", backends, &s->backend);
+  add_choice(table, "precision", precisions, &scene->mixed);
   add(table, "pressure", SETTING_REAL, POSITIVE, &s->pressure, "isotropic biaxial triaxial simple-shear");
   add(table, "start", SETTING_REAL, POSITIVE, &s->start, "isotropic");
   add(table, "duration", SETTING_REAL, POSITIVE, &s->duration, "isotropic");
@@ -102,35 +134,21 @@ static void fill_table(ElementSettings *s, Table *table) {
   add_real(table, "approach_steps", AT_LEAST_ONE, &s->most_steps);
 }
 
-/* One of `words`, whose positions are the values. */
-static BaseStatus read_choice(const Setting *setting, const char *text, const char *const words[3], int *choice) {
-  for (int k = 0; k < 3 && words[k]; k++)
-    if (strcmp(text, words[k]) == 0) {
-      *choice = k;
+static BaseStatus read_choice(const Setting *setting, const char *text) {
+  char list[128] = "";
+  for (int k = 0; setting->words[k]; k++) {
+    if (strcmp(text, setting->words[k]) == 0) {
+      memcpy(setting->value, &k, sizeof k);
       return BASE_OK;
     }
-  return base_error(BASE_ERROR_ARGUMENT, "--set %s: found '%s'; allowed: %s, %s%s%s", setting->name, text, words[0],
-                    words[1], words[2] ? ", " : "", words[2] ? words[2] : "");
+    strcat(strcat(list, k ? ", " : ""), setting->words[k]);
+  }
+  return base_error(BASE_ERROR_ARGUMENT, "--set %s: found '%s'; allowed: %s", setting->name, text, list);
 }
 
 static BaseStatus read_value(const Setting *setting, const char *text) {
-  static const char *const flags[3] = {"no", "yes", NULL}, *const grains[3] = {"disk", "sphere", NULL},
-                           *const backends[3] = {"auto", "cpu", "cuda"}, *const precisions[3] = {"double", "mixed", NULL};
-  int choice = 0;
   char *end;
-  if (setting->kind == SETTING_FLAG) return read_choice(setting, text, flags, setting->value);
-  if (setting->kind == SETTING_PRECISION) return read_choice(setting, text, precisions, setting->value);
-  if (setting->kind == SETTING_GRAIN) {
-    TRY(read_choice(setting, text, grains, &choice));
-    *(RveGrain *)setting->value = choice ? RVE_SPHERE : RVE_DISK;
-    return BASE_OK;
-  }
-  if (setting->kind == SETTING_BACKEND) {
-    static const RveBackend backend[3] = {RVE_BACKEND_AUTO, RVE_BACKEND_CPU, RVE_BACKEND_CUDA};
-    TRY(read_choice(setting, text, backends, &choice));
-    *(RveBackend *)setting->value = backend[choice];
-    return BASE_OK;
-  }
+  if (setting->kind == SETTING_CHOICE) return read_choice(setting, text);
   const double number = strtod(text, &end);
   if (end == text || *end != '\0' || !isfinite(number) || !is_in_range(setting->range, number))
     return base_error(BASE_ERROR_ARGUMENT, "--set %s: found '%s'; allowed: %s", setting->name, text,
@@ -149,7 +167,7 @@ static Setting *find(Table *table, const char *name, size_t length) {
 }
 
 static BaseStatus unknown(const Table *table, const char *word, size_t length) {
-  char names[768] = "";
+  char names[1024] = "";
   for (int k = 0; k < table->count; k++) {
     if (k) strcat(names, " ");
     strcat(names, table->setting[k].name);
@@ -195,13 +213,46 @@ static BaseStatus check_grains(Table *table, RveScene *scene) {
   return BASE_OK;
 }
 
+/* A setting that the model does not use is a mistake. */
+static BaseStatus check_conduction(Table *table, RveScene *scene) {
+  const GrainHeat *model = &scene->conduction;
+  const GrainIndirect indirect = model->indirect;
+  const int voronoi = indirect == GRAIN_INDIRECT_VORONOI_A || indirect == GRAIN_INDIRECT_VORONOI_B;
+  const int has_model = model->direct != GRAIN_DIRECT_NONE || indirect != GRAIN_INDIRECT_NONE;
+  const struct {
+    const char *name, *needed;
+    int used;
+  } uses[] = {{"area", "direct", model->direct != GRAIN_DIRECT_NONE},
+              {"fluid", "indirect", indirect != GRAIN_INDIRECT_NONE},
+              {"porosity", "indirect=voronoi_a or voronoi_b", voronoi},
+              {"reach", "indirect=voronoi_a or voronoi_b", voronoi},
+              {"core", "indirect=voronoi_b", indirect == GRAIN_INDIRECT_VORONOI_B},
+              {"layer", "indirect=layer", indirect == GRAIN_INDIRECT_LAYER},
+              {"minimum_gap", "indirect=layer", indirect == GRAIN_INDIRECT_LAYER},
+              {"grain_conductivity", "direct or indirect", has_model},
+              {"conductivity", "heat: expansion, Tref, and alpha or a conduction model", scene->thermal},
+              {"conductivity_every", "heat: expansion, Tref, and alpha or a conduction model", scene->thermal},
+              {"network_change", "conductivity=network", scene->network}};
+  for (size_t k = 0; k < sizeof uses / sizeof *uses; k++)
+    if (is_given(table, uses[k].name) && !uses[k].used)
+      return base_error(BASE_ERROR_ARGUMENT, "--set %s needs %s", uses[k].name, uses[k].needed);
+  if (!has_model) return BASE_OK;
+  if (is_given(table, "alpha"))
+    return base_error(BASE_ERROR_ARGUMENT, "--set alpha (heat pipes) and direct or indirect exclude each other");
+  if (indirect != GRAIN_INDIRECT_NONE) TRY(need(table, "fluid", "conductivity of the fluid, W/(m K)", " (indirect)"));
+  return need(table, "grain_conductivity", "of the grains' matter, W/(m K)", " (direct or indirect)");
+}
+
 static BaseStatus check_heat_and_bonds(Table *table, RveScene *scene) {
   static const char *const heat[3] = {"expansion", "Tref", "alpha"};
   static const char *const meaning[3] = {"linear expansion of the grains, 1/K",
                                          "temperature at which the packing's radii hold",
                                          "resistance of a heat pipe per length, K/(W m)"};
+  const int pipes = scene->conduction.direct == GRAIN_DIRECT_NONE && scene->conduction.indirect == GRAIN_INDIRECT_NONE;
+  scene->thermal = !pipes;
   for (int k = 0; k < 3; k++) scene->thermal |= is_given(table, heat[k]);
-  for (int k = 0; k < 3 && scene->thermal; k++) TRY(need(table, heat[k], meaning[k], " (heat)"));
+  for (int k = 0; k < 2 + pipes && scene->thermal; k++) TRY(need(table, heat[k], meaning[k], " (heat)"));
+  TRY(check_conduction(table, scene));
   if (!scene->thermal) scene->reference_temperature = 0.0;
   scene->bonds = is_given(table, "bond_strength");
   if (!scene->bonds && (is_given(table, "bond_shear_ratio") || is_given(table, "bond_melting")))

@@ -32,29 +32,33 @@ static void line_symmetric(FILE *out, int dimension, const double value[6]) {
     if (element_in_plane(dimension, k)) fprintf(out, ",%.12g", value[k]);
 }
 
-void element_table_head(FILE *out, int dimension, int thermal) {
+void element_table_head(FILE *out, const RveScene *scene) {
+  const int dimension = scene->dimension;
   fprintf(out, "time");
   for (int k = 0; k < 9; k++)
     if (dimension == 3 || (k / 3 < 2 && k % 3 < 2)) fprintf(out, ",F%c%c", element_axis[k / 3], element_axis[k % 3]);
   head_symmetric(out, dimension, "s");
-  if (thermal) {
+  if (scene->thermal) {
     fprintf(out, ",T");
     head_symmetric(out, dimension, "K");
+    if (scene->network) head_symmetric(out, dimension, "Kaffine_");
   }
   fprintf(out, ",heat,void_ratio,solid_fraction,coordination");
   head_symmetric(out, dimension, "fabric_");
   fprintf(out, ",bond_fraction,overlap,kinetic_energy,elastic_energy,friction_work,damping_work,unbalanced,volume,steps,status\n");
 }
 
-void element_table_line(FILE *out, int dimension, int thermal, const ElementState *state) {
+void element_table_line(FILE *out, const RveScene *scene, const ElementState *state) {
+  const int dimension = scene->dimension;
   const RveAnswer *a = &state->answer;
   fprintf(out, "%.12g", state->time);
   for (int k = 0; k < 9; k++)
     if (dimension == 3 || (k / 3 < 2 && k % 3 < 2)) fprintf(out, ",%.15g", state->gradient[k]);
   line_symmetric(out, dimension, a->stress);
-  if (thermal) {
+  if (scene->thermal) {
     fprintf(out, ",%.12g", state->temperature);
     line_symmetric(out, dimension, a->conductivity);
+    if (scene->network) line_symmetric(out, dimension, a->conductivity_affine);
   }
   fprintf(out, ",%.9g,%.12g,%.12g,%.9g", state->heat, 1.0 / a->solid_fraction - 1.0, a->solid_fraction, a->coordination);
   line_symmetric(out, dimension, a->fabric);

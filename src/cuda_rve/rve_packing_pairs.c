@@ -172,9 +172,18 @@ static BaseStatus visit_bins(const PairSearch *search) {
   return BASE_OK;
 }
 
+/* Whether a pair may be near through more than its nearest image. */
+static int is_narrow(const RvePacking *packing, double margin) {
+  double height[3];
+  packing_heights(packing->cell, height);
+  for (int k = 0; k < packing->dimension; k++)
+    if (height[k] < 2.0 * (2.0 * packing_largest_radius(packing) + margin)) return 1;
+  return 0;
+}
+
 BaseStatus packing_visit_pairs(const RvePacking *packing, double margin, PackingVisit visit, void *context) {
   PairSearch search = {.packing = packing, .margin = margin, .visit = visit, .context = context};
-  if (packing->grains <= PACKING_CRYSTAL_GRAINS) return visit_all_images(&search);
+  if (packing->grains <= PACKING_CRYSTAL_GRAINS || is_narrow(packing, margin)) return visit_all_images(&search);
   BaseStatus status;
   TRY_GOTO(fill_bins(&search), status, done);
   status = visit_bins(&search);

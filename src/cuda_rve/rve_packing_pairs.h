@@ -15,9 +15,9 @@ BaseStatus packing_create(int dimension, int grains, int motion, RvePacking *pac
 typedef BaseStatus (*PackingVisit)(void *context, int i, int j, const int image[3], const double branch[3],
                                    double distance);
 
-/* Visits all pairs whose surfaces are nearer than `margin` (m). Above PACKING_CRYSTAL_GRAINS grains the heights of the
- * cell must be at least twice the largest diameter plus margin, which the nearest image relies on. BASE_ERROR_ARGUMENT
- * if a crystal's cell is so flat that more than 17 images lie across a grain. */
+/* Visits all pairs whose surfaces are nearer than `margin` (m). In a cell of more than PACKING_CRYSTAL_GRAINS grains whose heights
+ * are at least twice the largest diameter plus margin only the nearest image can be; else all are tried. BASE_ERROR_ARGUMENT
+ * if a cell is so flat that more than 17 images lie across a grain. */
 BaseStatus packing_visit_pairs(const RvePacking *packing, double margin, PackingVisit visit, void *context);
 
 /* Distances between opposite faces of the cell, m (2D: the third is 1). */

@@ -24,7 +24,7 @@ typedef struct ReplayHeader {
 } ReplayHeader;
 
 static const char magic[8] = "dempmRPL";
-enum { REPLAY_VERSION = 2, MOST_BYTES = 1 << 30 };
+enum { REPLAY_VERSION = 3, MOST_BYTES = 1 << 30 };
 
 static uint64_t checksum_of(const ReplayHeader *header, const void *state) {
   const uint64_t hash = base_hash(header, offsetof(ReplayHeader, checksum), BASE_HASH_SEED);

@@ -11,11 +11,12 @@ typedef struct StateHeader {
   uint64_t scene_hash, payload_bytes;
   RveCounts counts;
   RveAnswer last;
+  RveConduction conduction;
   uint64_t checksum; /* of all above and the payload */
 } StateHeader;
 
 static const char magic[8] = "dempmRVE";
-enum { STATE_VERSION = 1 };
+enum { STATE_VERSION = 2 };
 
 static uint64_t checksum_of(const StateHeader *header, const void *payload) {
   uint64_t hash = base_hash(header, offsetof(StateHeader, checksum), BASE_HASH_SEED);
@@ -46,6 +47,7 @@ BaseStatus rve_record_pack(const RveRecord *record, uint64_t scene_hash, void *b
   header.payload_bytes = record->bytes;
   header.counts = record->counts;
   header.last = record->last;
+  header.conduction = record->conduction;
   /* The gap behind the last field is no state: the bytes must not depend on what the stack held. */
   const size_t end = offsetof(RveAnswer, status) + sizeof header.last.status;
   memset((char *)&header.last + end, 0, sizeof header.last - end);
@@ -107,6 +109,7 @@ static BaseStatus convert(const RveKernels *kernels, const RveRecord *from, RveR
   *rve_head(to->arena) = *rve_head(from->arena);
   rve_head(to->arena)->list_due = RVE_LIST_ABSENT;
   to->last = from->last;
+  to->conduction = from->conduction;
   for (int i = 0; i < n.blocks * n.lanes; i++) b->id[i] = -1;
   for (int q = 0; q < n.grains; q++) {
     const int i = a->id[q];
@@ -143,6 +146,7 @@ BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, con
   TRY(rve_record_alloc(&header.counts, &fresh));
   memcpy(fresh.arena, (const char *)bytes + sizeof header, fresh.bytes);
   fresh.last = header.last;
+  fresh.conduction = header.conduction;
   const int dim = header.counts.dimension - 2;
   *canonical = header.counts.lanes != kernels->lanes || header.counts.row != kernels->row[dim] ||
                header.counts.reaction != kernels->reaction[dim];

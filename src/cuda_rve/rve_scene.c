@@ -16,6 +16,10 @@ RveScene rve_scene_default(void) {
   scene.thickness = scene.density = scene.normal_stiffness = scene.tangential_stiffness = scene.friction = NAN;
   scene.expansion = scene.pipe_resistance = scene.grain_heat_capacity = NAN;
   scene.rotation = 1;
+  scene.conduction = grain_heat_default();
+  scene.grain_conductivity = NAN;
+  scene.network_change = 0.01;
+  scene.conductivity_every = 1;
   scene.bond_shear_ratio = 0.5;
   scene.bond_melting_temperature = INFINITY;
   scene.time_step_fraction = 0.5;
@@ -50,13 +54,27 @@ static BaseStatus check_contact(const RveScene *scene) {
   return flag("rotation", scene->rotation);
 }
 
+static BaseStatus check_conduction(const RveScene *scene) {
+  TRY(flag("network", scene->network));
+  TRY(not_negative("network_change", scene->network_change));
+  if (scene->conductivity_every < 1) return outside("conductivity_every", scene->conductivity_every, ">= 1");
+  if (scene->conduction.direct == GRAIN_DIRECT_NONE && scene->conduction.indirect == GRAIN_INDIRECT_NONE)
+    return positive("pipe_resistance", scene->pipe_resistance);
+  if (scene->conduction.direct == GRAIN_DIRECT_COLLISIONAL)
+    return base_error(BASE_ERROR_ARGUMENT, "conduction.direct = collisional (allowed: none, batchelor, liggghts, pipe)");
+  if (!isnan(scene->pipe_resistance))
+    return base_error(BASE_ERROR_ARGUMENT, "pipe_resistance and a conduction model exclude each other");
+  TRY(grain_heat_check(&scene->conduction));
+  return positive("grain_conductivity", scene->grain_conductivity);
+}
+
 static BaseStatus check_heat(const RveScene *scene) {
   TRY(flag("thermal", scene->thermal));
   if (!scene->thermal) return BASE_OK;
   TRY(not_negative("expansion", scene->expansion));
   if (!isfinite(scene->reference_temperature))
     return outside("reference_temperature", scene->reference_temperature, "a finite temperature");
-  return positive("pipe_resistance", scene->pipe_resistance);
+  return check_conduction(scene);
 }
 
 static BaseStatus check_bonds(const RveScene *scene) {
@@ -123,7 +141,8 @@ static void call_material(const RveScene *scene, RveCall *call) {
   call->thermal = scene->thermal;
   call->expansion = scene->thermal ? scene->expansion : 0.0;
   call->reference_temperature = scene->reference_temperature;
-  call->pipe_resistance = scene->thermal ? scene->pipe_resistance : 1.0;
+  /* With a conduction model the kernels' sum over pipes is replaced afterwards. */
+  call->pipe_resistance = scene->thermal && !isnan(scene->pipe_resistance) ? scene->pipe_resistance : 1.0;
   call->bond_strength = scene->bond_strength;
   call->bond_shear_ratio = scene->bond_shear_ratio;
   call->bond_melting_temperature = scene->bond_melting_temperature;

@@ -171,6 +171,7 @@ BaseStatus rve_record_grow(RveRecord *record) {
   if (n.slot_rows == record->counts.slot_rows && n.incoming_rows == record->counts.incoming_rows) return BASE_OK;
   TRY(rve_record_alloc(&n, &larger));
   larger.last = record->last;
+  larger.conduction = record->conduction;
   copy_arena(record, &larger);
   rve_record_destroy(record);
   *record = larger;

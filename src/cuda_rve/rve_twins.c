@@ -47,6 +47,7 @@ BaseStatus rve_twins_copy(RveBatch *batch, int from, int to) {
   memcpy(copy->arena, model->arena, model->bytes);
   copy->counts = model->counts;
   copy->last = model->last;
+  copy->conduction = model->conduction;
   rve_layout(&copy->counts, copy->arena, &copy->arrays);
   return BASE_OK;
 }

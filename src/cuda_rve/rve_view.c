@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* An RVE's grains and contacts for writers, tests and other batches; conduction between its grains. */
-#include <math.h>
+/* An RVE's grains and contacts for writers, tests and other batches. */
 #include <string.h>
 
 #include "rve_backend.h"
@@ -173,75 +172,4 @@ BaseStatus rve_record_packing(const RveRecord *record, RvePacking *packing) {
   for (rve_slot_start(record, &slot); rve_slot_next(&slot);)
     if (is_contact(&slot)) packing_contact(&slot, c++, packing);
   return BASE_OK;
-}
-
-/* ----------------------------------------------------------------------------------------------------- conduction */
-
-typedef struct Network {
-  int contacts;
-  int *pair;
-  double *conductance;        /* W/K */
-  double *capacity, *outflow; /* [grains] J/K; W */
-} Network;
-
-static void network_destroy(Network *network) {
-  base_free(network->pair), base_free(network->conductance), base_free(network->capacity), base_free(network->outflow);
-}
-
-static BaseStatus network_create(const RveRecord *record, const RveScene *scene, Network *network, double *limit) {
-  const RveArrays *a = &record->arrays;
-  const int grains = record->counts.grains;
-  RveSlot slot;
-  int c = 0;
-  memset(network, 0, sizeof *network);
-  network->contacts = count_contacts(record);
-  TRY(BASE_ALLOC((size_t)network->contacts * 2, &network->pair));
-  TRY(BASE_ALLOC((size_t)network->contacts, &network->conductance));
-  TRY(BASE_ALLOC((size_t)grains, &network->capacity));
-  TRY(BASE_ALLOC((size_t)grains, &network->outflow));
-  for (rve_slot_start(record, &slot); rve_slot_next(&slot);) {
-    if (!is_contact(&slot)) continue;
-    const int i = a->id[slot.i], j = a->id[slot.j];
-    network->pair[2 * c] = i, network->pair[2 * c + 1] = j;
-    network->conductance[c] = 1.0 / (scene->pipe_resistance * slot.length);
-    if (i != j) network->outflow[i] += network->conductance[c], network->outflow[j] += network->conductance[c];
-    c++;
-  }
-  *limit = INFINITY;
-  for (int q = 0; q < grains; q++) {
-    const int i = a->id[q];
-    network->capacity[i] = a->mass[q] * scene->grain_heat_capacity;
-    if (network->outflow[i] > 0.0) *limit = fmin(*limit, network->capacity[i] / network->outflow[i]);
-  }
-  return BASE_OK;
-}
-
-static void network_step(const Network *network, int grains, double dt, double *temperature) {
-  memset(network->outflow, 0, (size_t)grains * sizeof *network->outflow);
-  for (int c = 0; c < network->contacts; c++) {
-    const int i = network->pair[2 * c], j = network->pair[2 * c + 1];
-    const double q = network->conductance[c] * (temperature[i] - temperature[j]);
-    network->outflow[i] += q, network->outflow[j] -= q;
-  }
-  for (int i = 0; i < grains; i++) temperature[i] -= dt * network->outflow[i] / network->capacity[i];
-}
-
-BaseStatus rve_record_conduct(const RveRecord *record, const RveScene *scene, double time_step, int64_t steps,
-                              double *temperature) {
-  Network network;
-  double limit;
-  if (!scene->thermal) return base_error(BASE_ERROR_ARGUMENT, "thermal = 0 (allowed: thermal scenes)");
-  if (!(scene->grain_heat_capacity > 0.0))
-    return base_error(BASE_ERROR_ARGUMENT, "grain_heat_capacity = %g (allowed: > 0)", scene->grain_heat_capacity);
-  if (!(time_step > 0.0) || steps < 0)
-    return base_error(BASE_ERROR_ARGUMENT, "time_step = %g, steps = %lld (allowed: > 0, >= 0)", time_step,
-                      (long long)steps);
-  BaseStatus status = network_create(record, scene, &network, &limit);
-  if (status == BASE_OK && time_step > limit)
-    status =
-        base_error(BASE_ERROR_ARGUMENT, "time_step = %g s (allowed: at most min m c / sum h = %g s)", time_step, limit);
-  if (status == BASE_OK)
-    for (int64_t k = 0; k < steps; k++) network_step(&network, record->counts.grains, time_step, temperature);
-  network_destroy(&network);
-  return status;
 }

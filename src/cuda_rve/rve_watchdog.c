@@ -20,6 +20,7 @@ BaseStatus rve_keep_before(const RveRecord *record, RveWorkspace *workspace) {
   before->counts = record->counts;
   before->bytes = record->bytes;
   before->last = record->last;
+  before->conduction = record->conduction;
   memcpy(before->arena, record->arena, record->bytes);
   return BASE_OK;
 }
@@ -117,7 +118,7 @@ static void describe(const RveRecord *record, const RveCall *call, size_t room, 
              "grain %d moves %.3g m in one DEM step of %.3g s; at most half the smallest radius, %.3g m, is allowed",
              fastest.grain + 1, fastest.speed * call->dt, call->dt, 0.5 * smallest);
   else if (head->list_due == RVE_LIST_GOOD) { /* the steps went well, the answer did not */
-    snprintf(text, room, "the stress, an energy or another answer is not finite");
+    snprintf(text, room, "the stress, an energy or another answer is not finite, or the network of conductances has no solution");
     return;
   } else describe_cell(record, room, text);
   describe_state(record, room, text);

@@ -17,8 +17,9 @@ library=$(cd "$here/../.." && pwd)/build
 vtk=$(ls -d /usr/include/vtk-9* 2>/dev/null | head -1)
 vtk_version=${vtk##*/vtk-}
 
-files="double_sum.h fix_bond_gran_arrays.cpp fix_bond_gran_thermal.cpp fix_bond_gran_thermal.h fix_expansion_gran.cpp
-  fix_expansion_gran.h fix_heat_gran_grain.cpp fix_heat_gran_grain.h fix_heat_gran_history.cpp fix_mpm_couple.cpp fix_mpm_couple.h
+files="conduction_keywords.cpp conduction_keywords.h double_sum.h fix_bond_gran_arrays.cpp fix_bond_gran_thermal.cpp
+  fix_bond_gran_thermal.h fix_expansion_gran.cpp fix_expansion_gran.h fix_heat_gran_grain.cpp fix_heat_gran_grain.h
+  fix_heat_gran_history.cpp fix_mpm_couple.cpp fix_mpm_couple.h
   fix_mpm_couple_arrays.cpp fix_mpm_couple_output.cpp fix_mpm_couple_step.cpp fix_mpm_rve.cpp fix_mpm_rve.h
   fix_mpm_traction.cpp fix_mpm_traction.h fix_mpm_wall.cpp fix_mpm_wall.h heat_walls.cpp heat_walls.h keyword_parser.cpp keyword_parser.h
   material_properties.cpp material_properties.h point_output.cpp point_output.h rank_error.cpp rank_error.h

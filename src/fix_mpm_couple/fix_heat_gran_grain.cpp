@@ -6,6 +6,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "conduction_keywords.h"
 #include "fix_property_atom.h"
 #include "force.h"
 #include "keyword_parser.h"
@@ -41,13 +42,13 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
   vector_flag = 1;
   size_vector = FLOWS;
   extvector = 1;
-  KeywordParser parser(lmp, this, narg, arg, 3,
-                       {"initial_temperature", "direct", "area", "indirect", "fluid", "porosity", "core", "reach",
-                        "layer", "minimum_gap", "convection", "radiation", "absolute_zero", "friction"});
+  std::vector<std::string> keywords = {"initial_temperature", "convection", "radiation", "absolute_zero", "friction"};
+  keywords.insert(keywords.begin() + 1, CONDUCTION_KEYWORDS.begin(), CONDUCTION_KEYWORDS.end());
+  KeywordParser parser(lmp, this, narg, arg, 3, keywords);
   read_model(parser);
   parser.require("initial_temperature", "initial_temperature T");
   parser.require("direct", "direct none|batchelor|liggghts|pipe|collisional");
-  check_keywords(parser);
+  check_conduction(parser, model_);
   convection_ = parser.given("convection"), radiation_ = parser.given("radiation");
   check_radiation(parser);
   const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
@@ -60,17 +61,7 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
 void FixHeatGranGrain::read_model(KeywordParser &parser) {
   while (parser.next()) {
     if (parser.is("initial_temperature")) T0 = parser.number(NumberRange::any());
-    else if (parser.is("direct"))
-      model_.direct = (GrainDirect)parser.choice({"none", "batchelor", "liggghts", "pipe", "collisional"});
-    else if (parser.is("area")) model_.area = (GrainArea)parser.choice({"geometric", "hertz"});
-    else if (parser.is("indirect"))
-      model_.indirect = (GrainIndirect)parser.choice({"none", "voronoi_a", "voronoi_b", "layer"});
-    else if (parser.is("fluid")) model_.fluid = parser.number(NumberRange::positive());
-    else if (parser.is("porosity")) model_.porosity = parser.number(NumberRange::inside(0.0, 1.0));
-    else if (parser.is("core")) model_.core = parser.number(NumberRange::inside(0.0, 1.0));
-    else if (parser.is("reach")) model_.reach = parser.number(NumberRange::positive());
-    else if (parser.is("layer")) model_.layer = parser.number(NumberRange::positive());
-    else if (parser.is("minimum_gap")) model_.minimum_gap = parser.number(NumberRange::positive());
+    else if (read_conduction(parser, model_, true)) continue;
     else if (parser.is("convection")) {
       surface_.coefficient = parser.number(NumberRange::at_least(0.0));
       surface_.fluid_temperature = parser.number(NumberRange::any());
@@ -99,25 +90,6 @@ void FixHeatGranGrain::check_radiation(const KeywordParser &parser) const {
       parser.fail(format_text("keyword '%s': the temperature is %g, allowed is a number >= %g; keyword 'absolute_zero' "
                               "names the absolute zero of another scale",
                               check.keyword, check.temperature, surface_.absolute_zero));
-}
-
-/* A keyword that the model does not use is a mistake in the script. */
-void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
-  const GrainIndirect a = GRAIN_INDIRECT_VORONOI_A, b = GRAIN_INDIRECT_VORONOI_B, layer = GRAIN_INDIRECT_LAYER;
-  const struct {
-    const char *keyword, *models;
-    bool used;
-  } uses[] = {{"area", "'direct batchelor', 'liggghts', 'pipe' or 'collisional'", model_.direct != GRAIN_DIRECT_NONE},
-              {"fluid", "'indirect voronoi_a', 'voronoi_b' or 'layer'", model_.indirect != GRAIN_INDIRECT_NONE},
-              {"porosity", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
-              {"reach", "'indirect voronoi_a' or 'voronoi_b'", model_.indirect == a || model_.indirect == b},
-              {"core", "'indirect voronoi_b'", model_.indirect == b},
-              {"layer", "'indirect layer'", model_.indirect == layer},
-              {"minimum_gap", "'indirect layer'", model_.indirect == layer}};
-  for (const auto &use : uses)
-    if (parser.given(use.keyword) && !use.used)
-      parser.fail(std::string("keyword '") + use.keyword + "' has a meaning with " + use.models + " only");
-  if (model_.indirect != GRAIN_INDIRECT_NONE) parser.require("fluid", "fluid K, the conductivity of the fluid");
 }
 
 int FixHeatGranGrain::setmask() {

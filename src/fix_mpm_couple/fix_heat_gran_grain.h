@@ -65,7 +65,6 @@ class FixHeatGranGrain : public FixHeatGran {
   std::vector<double> built_;        /* positions when the neighbour list was built */
 
   void read_model(class KeywordParser &);
-  void check_keywords(const class KeywordParser &) const;
   double find_largest_radius() const;
   void check_skin();
   bool collides() const { return model_.direct == GRAIN_DIRECT_COLLISIONAL; }

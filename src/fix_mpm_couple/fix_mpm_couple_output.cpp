@@ -129,6 +129,9 @@ void FixMPMCouple::post_run() {
                       "%lld not run as their points rest\n",
                       id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared), (long long)law.shared,
                       (long long)law.rested);
+  if (law.networks_solved > 0)
+    line += format_text("Fix %s: conductivity of networks so far: %lld solved, %lld carried along from an earlier solution\n", id,
+                        (long long)law.networks_solved, (long long)law.networks_kept);
   if (screen) fputs(line.c_str(), screen);
   if (logfile) fputs(line.c_str(), logfile);
 }

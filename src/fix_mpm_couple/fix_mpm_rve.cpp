@@ -9,6 +9,7 @@
 
 #include "../cuda_rve/rve_packing.h"
 #include "comm.h"
+#include "conduction_keywords.h"
 #include "domain.h"
 #include "keyword_parser.h"
 #include "material_properties.h"
@@ -49,10 +50,12 @@ FixMPMRve::~FixMPMRve() {
 }
 
 void FixMPMRve::read_keywords(int narg, char **arg) {
-  KeywordParser parser(lmp, this, narg, arg, 3,
+  std::vector<std::string> keywords =
                        {"packing", "model", "tangential", "density", "grain", "thickness", "damping", "pipe_resistance",
                         "reference", "bonds", "substeps", "timestep/dem", "skin", "rotation", "precision", "share", "rest", "backend", "threads",
-                        "replay"});
+                        "replay", "conductivity"};
+  keywords.insert(keywords.end(), CONDUCTION_KEYWORDS.begin(), CONDUCTION_KEYWORDS.end());
+  KeywordParser parser(lmp, this, narg, arg, 3, keywords);
   while (parser.next()) {
     if (parser.is("packing")) {
       do packing_files_.push_back(parser.word("the name of a file with a periodic packing"));
@@ -78,6 +81,8 @@ void FixMPMRve::read_keywords(int narg, char **arg) {
           (RveBackend[]){RVE_BACKEND_AUTO, RVE_BACKEND_CPU, RVE_BACKEND_CUDA}[parser.choice({"auto", "cpu", "cuda"})];
     else if (parser.is("threads")) scene_.threads = parser.integer(0, 4096);
     else if (parser.is("replay")) read_replay(parser);
+    else if (parser.is("conductivity")) read_conductivity(parser);
+    else read_conduction(parser, scene_.conduction, false);
   }
   check_keywords(parser);
   read_packings(0.0);
@@ -96,6 +101,25 @@ void FixMPMRve::check_keywords(const KeywordParser &parser) {
       parser.fail("keyword 'grain': 'disk' is given, allowed is sphere in 3D");
     if (parser.given("thickness")) parser.fail("keyword 'thickness' is for 2D only");
     scene_.grain = RVE_SPHERE;
+  }
+  check_conduction(parser, scene_.conduction);
+  if (!has_model()) return;
+  parser.exclude("pipe_resistance", "direct");
+  parser.exclude("pipe_resistance", "indirect");
+  if (grain_heat_check(&scene_.conduction) != BASE_OK) parser.fail(base_error_message());
+}
+
+/* One direct or indirect model, in place of heat pipes. */
+bool FixMPMRve::has_model() const {
+  return scene_.conduction.direct != GRAIN_DIRECT_NONE || scene_.conduction.indirect != GRAIN_INDIRECT_NONE;
+}
+
+void FixMPMRve::read_conductivity(KeywordParser &parser) {
+  scene_.network = parser.choice({"affine", "network"});
+  while (parser.has_value()) {
+    if (parser.accept("every")) scene_.conductivity_every = parser.integer(1, 1000000000);
+    else if (scene_.network && parser.accept("change")) scene_.network_change = parser.number(NumberRange::between(0.0, 0.1));
+    else parser.refuse(parser.word(""), scene_.network ? "every N or change E" : "every N");
   }
 }
 
@@ -168,11 +192,12 @@ void FixMPMRve::read_properties(RveScene &scene, int type, bool thermal) const {
     return;
   }
   scene.expansion = properties.of_type("thermalExpansionCoefficient", NumberRange::at_least(0.0));
-  if (std::isnan(scene.pipe_resistance))
+  if (has_model()) scene.grain_conductivity = properties.of_type("thermalConductivity", NumberRange::positive());
+  else if (std::isnan(scene.pipe_resistance))
     fix_failed(
         lmp, this,
         "keyword 'pipe_resistance' is missing: with 'thermal yes' in fix mpm/couple the resistance of the grains' "
-        "heat pipes per length, K/(W m), is needed");
+        "heat pipes per length, K/(W m), is needed, or a conduction model (keywords 'direct' and 'indirect')");
   if (std::isnan(scene.reference_temperature))
     fix_failed(lmp, this,
                "keyword 'reference' is missing: with 'thermal yes' in fix mpm/couple the temperature at which the "

@@ -24,10 +24,13 @@ namespace LAMMPS_NS {
  *       [grain disk|sphere] [thickness Z] [damping none|local A|viscous F] [pipe_resistance A] [reference T0]
  *       [bonds strength B shear_ratio M melting TS|none] [substeps N] [timestep/dem DT] [skin S] [rotation yes|no]
  *       [precision double|mixed] [share yes|no] [backend auto|cpu|cuda] [threads N] [replay DIRECTORY|none]
+ *       [direct MODEL] [indirect MODEL] [their keywords: conduction_keywords.h]
+ *       [conductivity affine|network [change E] [every N]]
  *
- * `grain` and `thickness` are required in 2D; `pipe_resistance` and `reference` with `thermal yes` of fix mpm/couple.
+ * `grain` and `thickness` are required in 2D; `reference` and `pipe_resistance` or a conduction model with `thermal yes` of fix
+ * mpm/couple.
  * Grains' properties come from `fix property/global`: kn, kt, coefficientFriction, gamman, gammat (peratomtypepair) and
- * thermalExpansionCoefficient (peratomtype), for the atom type of the points. Changed ones hold from the next run on.
+ * thermalExpansionCoefficient, thermalConductivity (peratomtype), for the atom type of the points. Changed ones hold from the next run on.
  *
  *   fix_modify ID bonds install    bonds every contact of every RVE (again)
  *   fix_modify ID rest             sets the grains' fluctuation velocities and spins to zero
@@ -73,6 +76,8 @@ class FixMPMRve : public Fix {
   void read_damping(class KeywordParser &);
   void read_bonds(class KeywordParser &);
   void read_replay(class KeywordParser &);
+  void read_conductivity(class KeywordParser &);
+  bool has_model() const;
   void read_packings(double tangential_stiffness);
   void read_properties(RveScene &scene, int type, bool thermal) const;
   void check_dem_time_step(const RveScene &scene) const;

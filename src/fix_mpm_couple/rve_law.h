@@ -31,6 +31,7 @@ typedef struct RveLawTotals {
   int64_t particle_steps;  /* grains times DEM steps, since the law was created (not before a restart) */
   int64_t calls, shared;   /* steps of RVEs since then, and how many were copies of a twin's (depends on the ranks) */
   int64_t rested;          /* steps that were not run since their points are at rest, not among the calls */
+  int64_t networks_solved, networks_kept; /* conductivities of networks since then: solved, carried along from a solution */
   double worst_unbalanced; /* of the last step */
   double friction_work;    /* J, slip work since the RVEs were created (per metre of depth in 2D) */
   double damping_work;     /* J, lost to local and viscous damping, likewise */

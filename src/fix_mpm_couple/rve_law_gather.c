@@ -66,13 +66,15 @@ BaseStatus rve_law_totals(RveLaw *law, RveLawTotals *totals) {
   sum_shares(law, own, all, count, start, sum);
   RveStoreTotals local;
   rve_store_totals(law->store, &local);
-  int64_t counted[6] = {local.grains, local.particle_steps, law->rves_run, local.calls, local.shared, law->rested};
+  int64_t counted[8] = {local.grains, local.particle_steps, law->rves_run, local.calls, local.shared, law->rested, local.solved,
+                        local.kept};
   double largest[2] = {law->worst_unbalanced, local.seconds};
-  MPI_Allreduce(MPI_IN_PLACE, counted, 6, MPI_INT64_T, MPI_SUM, law->comm);
+  MPI_Allreduce(MPI_IN_PLACE, counted, 8, MPI_INT64_T, MPI_SUM, law->comm);
   MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, law->comm);
   *totals = (RveLawTotals){.rves = rve_farm_size(law->farm), .grains = counted[0], .particle_steps = counted[1],
                            .rves_run = counted[2], .calls = counted[3], .shared = counted[4],
-                           .rested = counted[5], .worst_unbalanced = largest[0], .seconds = largest[1],
+                           .rested = counted[5], .networks_solved = counted[6],
+                           .networks_kept = counted[7], .worst_unbalanced = largest[0], .seconds = largest[1],
                            .friction_work = sum[0], .damping_work = sum[1], .stored_energy = sum[2]};
 done:
   base_free(own);

@@ -357,7 +357,11 @@ BaseStatus rve_store_view(const RveStore *store, int handle, RveView *view) {
 
 void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
   *totals = (RveStoreTotals){.particle_steps = store->particle_steps, .calls = store->calls, .seconds = store->seconds};
-  for (int b = 0; b < store->batches; b++) totals->shared += rve_batch_shared(store->batch[b]);
+  for (int b = 0; b < store->batches; b++) {
+    int64_t solved, kept;
+    rve_batch_network_counts(store->batch[b], &solved, &kept);
+    totals->shared += rve_batch_shared(store->batch[b]), totals->solved += solved, totals->kept += kept;
+  }
   for (int s = 0; s < store->slots; s++)
     if (store->slot[s].batch >= 0) totals->grains += store->slot[s].item.grains;
 }

@@ -64,6 +64,7 @@ typedef struct RveStoreTotals {
   int64_t grains;         /* of RVEs present */
   int64_t particle_steps; /* grains times DEM steps, since the store was created */
   int64_t calls, shared;  /* steps of RVEs, and how many of them were copies of a twin's (of the batches present) */
+  int64_t solved, kept;   /* networks: solved, and carried along from an earlier solution (of the batches present) */
   double seconds;         /* wall time in the RVE engine's steps since then */
 } RveStoreTotals;
 void rve_store_totals(const RveStore *store, RveStoreTotals *totals);

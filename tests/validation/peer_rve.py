@@ -84,11 +84,11 @@ def rve_run(packing, dimension, env=None, **keywords):
     return {name: [row[k] for row in rows] for k, name in enumerate(COLUMNS)}, code == 0, lines[-1]
 
 
-def settle(packing, folder, density, steps, **law):
-    """Brings a packing to rest in its orthogonal cell, without friction. Returns the unbalanced force and the coordination."""
+def settle(packing, folder, density, steps, kt=0, **law):
+    """Brings a packing to rest in its orthogonal cell, without friction if kt = 0. Returns the unbalanced force and the coordination."""
     data, grains = pathlib.Path(folder) / "settle.data", pathlib.Path(folder) / "settled.txt"
     data.write_text(packing.data(density, height=0.05))
-    found, stable, _ = rve_run(data, packing.dimension, density=density, thickness=1.0, kt=0, local=0.5, steps=steps,
+    found, stable, _ = rve_run(data, packing.dimension, density=density, thickness=1.0, kt=kt, local=0.5, steps=steps,
                                grains=grains, env=PLAIN, **law)
     assert stable
     for i, line in enumerate(grains.read_text().splitlines()):
