@@ -47,7 +47,7 @@ def main():
     start, failed, comparisons = time.monotonic(), [], []
     for name in arguments.cases or CASES:
         print(name, flush=True)
-        comparison = Comparison(name, folder, arguments.quick)
+        comparison = Comparison(name, folder, "quick" if arguments.quick else "full")
         comparisons.append(comparison)
         try:
             importlib.import_module(f"scene_{name}").compare(comparison)

@@ -69,17 +69,62 @@ def arrays(frame):
     return {name: np.array(values) for name, values in frame[1].items()}
 
 
+@dataclasses.dataclass
+class Scene:
+    """A folder of examples/compare, and how its grains are made. A full DEM of fewer grains has larger ones: lengths and time step grow alike."""
+    folder: str
+    radius: tuple    # smallest and largest
+    total: int       # grains of that radius in the full DEM
+    step: float      # of their time, at most
+    settings: dict   # of their packings
+    answer: object   # function of a run and "full_dem" or "multiscale"
+
+    def scale(self, total):
+        return np.sqrt(self.total / total)
+
+    def scaled(self, scale):
+        """What goes with the size of the grains: their time step, and the dashpots that keep the fraction of critical damping."""
+        return {"dt": exact_step(scale * self.step), "gamman": f"{4000 / scale:.6g}"}
+
+    def pack(self, study, name, grains, seed, scale):
+        return study.pack(f"{name}_{grains}_{seed}", threads=1, radius=tuple(scale * r for r in self.radius), grains=grains, seed=seed,
+                          **self.settings)
+
+    def full_dem(self, study, total, seeds, variables, spare, cut):
+        """`spare`(scale) times `total` grains are packed; cut(packing, stem, scale) makes ({variable: file})."""
+        scale, runs = self.scale(total), []
+        for seed in range(1, seeds + 1):
+            large = self.pack(study, "full", round(spare(scale) * total), seed, scale)
+            files = cut(large, study.folder / f"cut_{total}_{seed}", scale)
+            words = {**variables, **{name: path.name for name, path in files.items()}, **self.scaled(scale)}
+            runs.append(study.run(f"full_{total}_{seed}", "in.full_dem", words, [self.folder], list(files.values()), threads=1))
+        grains = len(runs[0].dump("out/full_dem.dump")[0][1]["id"])
+        return Side(f"full DEM, {grains} grains", runs, [self.answer(run, "full_dem") for run in runs], grains)
+
+    def multiscale(self, study, size, grains, scale, replicates, variables):
+        """`size`: variables that set points and grid. Each run has four packings of its own, which the points take in turn."""
+        runs = []
+        for k in range(replicates):
+            packings = [self.pack(study, "rve", grains, 4 * k + seed, scale) for seed in range(1, 5)]
+            words = {**variables, **size, "packing": [p.name for p in packings], **self.scaled(scale)}
+            name = "_".join(["multiscale", *(f"{value:g}" for value in size.values()), str(grains), str(k)])
+            runs.append(study.run(name, "in.multiscale", words, [self.folder], packings, grains=grains, threads=1))
+        points = runs[0].points
+        return Side(f"multiscale, {points} x {grains}", runs, [self.answer(run, "multiscale") for run in runs], points * grains)
+
+
 class Comparison(Study):
     """Rows {"case", "quantity", "error", "seconds_multiscale", "seconds_full_dem", "grains_full_dem", "seeds"}, and further "multiscale":
     which size, "spread": the same error of one full DEM against the mean of the others."""
 
-    def __init__(self, case, folder, quick):
-        super().__init__(case, folder, full=not quick)
-        self.quick, self.coarse_rows, self.tables = quick, [], []
+    def __init__(self, case, folder, size):
+        """size: full, quick (few grains, to try it) or tiny (for tests: no figures)."""
+        super().__init__(case, folder, full=size == "full")
+        self.size, self.coarse_rows, self.tables = size, [], []
 
-    def grains(self, name, **settings):
-        """A packing by dempm-pack on one thread."""
-        return self.pack(name, threads=1, **settings)
+    def sizes(self, total):
+        """Grains of the full DEMs: the reference, and such with fewer, larger grains."""
+        return [total, total // 4, total // 10, total // 30] if self.full else [total]
 
     def compare(self, reference, levels, coarse):
         """Errors of every multiscale size and of full DEMs of fewer, larger grains."""
@@ -95,6 +140,8 @@ class Comparison(Study):
             for q in quantities:
                 self.coarse_rows.append({"case": self.case, "quantity": q, "error": self.error(side, reference, q),
                                          "seconds": round(side.seconds, 2), "grains": side.grains, "seeds": len(side.runs)})
+        if self.size == "tiny":
+            return
         self.tables.append(self.table(reference, levels, coarse, quantities, spread))
         for side in [*levels, *coarse]:
             print(f"  {self.case}: {side.label}: {side.seconds:.1f} s, " +

@@ -2,55 +2,39 @@
 """(a) Heat conduction through a compressed bed between held walls; heated grains press."""
 import numpy as np
 
-from comparison import BLUE, RED, Side, arrays, curve_band, exact_step, lagrangian, plt
+from comparison import BLUE, RED, Scene, arrays, curve_band, lagrangian, plt
 from cut import cut_block, read_packing, write_data, write_groups
 
-LENGTH, DENSITY, RADIUS, FULL = 1.0, 2650, (0.0034, 0.0068), 10000
-GRAINS = dict(pressure=5e4, preparation_friction=0.01, density=DENSITY, kn=1e7, kt=1e7, thickness=1)
+LENGTH, DENSITY = 1.0, 2650
 LINES = np.arange(0, LENGTH + 1e-9, 0.125), np.array([-9.0, 9.0])  # profiles are compared on slices
-# edge of the grid's cells, of a point each; grains of a packing
-LEVELS = [(0.125, 36), (0.125, 100), (0.0625, 100), (0.0625, 400)]
+# edge of the grid's cells, of a point each, step of the points; grains of a packing
+COARSE, FINE = dict(grid=0.125, step=5e-4), dict(grid=0.0625, step=2.5e-4)
+LEVELS = [(COARSE, 36), (COARSE, 100), (FINE, 100), (FINE, 400)]
 
 
 def compare(study):
-    total, seeds = (1000, 2) if study.quick else (FULL, 3)
-    times = {"t_run": 0.2 if study.quick else 0.6}
-    scale = np.sqrt(FULL / total)
-    sizes = [total] if study.quick else [total, total // 4, total // 10, total // 30]
-    fulls = [full_dem(study, n, seeds, times) for n in sizes]
-    sides = [multiscale(study, level, scale, 1 if study.quick else 3, times) for level in (LEVELS[:1] if study.quick else LEVELS)]
+    scene = Scene("compare/bed", (0.0034, 0.0068), 10000, 1.8e-5, answer=answer,
+                  settings=dict(pressure=5e4, preparation_friction=0.01, density=DENSITY, kn=1e7, kt=1e7, thickness=1))
+    slab = lambda scale: 4 * scale * np.mean(scene.radius)
+    spare = lambda scale: (1.02 * LENGTH + 2 * slab(scale)) ** 2  # packings are square; `total` grains are a square metre
+
+    def cut(packing, stem, scale):
+        files = {kind: stem.with_suffix(f".{kind}") for kind in ("data", "groups")}
+        grains = cut_block(packing, (LENGTH, 0), slab(scale), 0)
+        write_data(files["data"], grains, (-0.2, 1.2, 0.0, read_packing(packing)[2][1]), DENSITY, 2)
+        write_groups(files["groups"], grains[3])
+        return files
+
+    sizes = {"full": (scene.total, 3, 3, LEVELS, 0.6),
+             "quick": (1000, 2, 1, LEVELS[:1], 0.2),
+             "tiny": (250, 1, 1, [(COARSE, 16)], 0.05)}
+    total, seeds, replicates, levels, t_run = sizes[study.size]
+    times = {"t_run": t_run, "every": max(0.01, round(t_run / 6, 2))}
+    fulls = [scene.full_dem(study, n, seeds, times, spare, cut) for n in study.sizes(total)]
+    sides = [scene.multiscale(study, size, grains, scene.scale(total), replicates, times) for size, grains in levels]
     study.compare(fulls[0], sides, fulls[1:])
-    draw(study, fulls[0], sides[-1])
-
-
-def full_dem(study, total, seeds, times):
-    """`total` grains on a square metre."""
-    scale, runs = np.sqrt(FULL / total), []
-    slab = 4 * np.mean(RADIUS) * scale
-    spare = (1.02 * LENGTH + 2 * slab) ** 2  # the packing is square
-    for seed in range(1, seeds + 1):
-        large = study.grains(f"full_{total}_{seed}", radius=tuple(scale * r for r in RADIUS), grains=round(spare * total), seed=seed, **GRAINS)
-        data, groups = (study.folder / f"block_{total}_{seed}.{kind}" for kind in ("data", "groups"))
-        grains = cut_block(large, (LENGTH, 0), slab, 0)
-        write_data(data, grains, (-0.2, 1.2, 0.0, read_packing(large)[2][1]), DENSITY, 2)
-        write_groups(groups, grains[3])
-        variables = {"data": data.name, "groups": groups.name, "dt": exact_step(1.8e-5 * scale), **times}
-        runs.append(study.run(f"full_{total}_{seed}", "in.full_dem", variables, ["compare/bed"], [data, groups], threads=1))
-    grains = len(runs[0].dump("out/full_dem.dump")[0][1]["id"])
-    return Side(f"full DEM, {grains} grains", runs, [answer(run, "full_dem") for run in runs], grains)
-
-
-def multiscale(study, level, scale, replicates, times):
-    grid, grains = level
-    runs = []
-    for replicate in range(replicates):
-        packings = [study.grains(f"rve_{grains}_{seed}", radius=tuple(scale * r for r in RADIUS), grains=grains, seed=seed, **GRAINS)
-                    for seed in range(5 * replicate + 1, 5 * replicate + 6)]
-        variables = {"packing": [p.name for p in packings], "grid": grid, "step": 5e-4 * grid / 0.125, "dt": exact_step(1.8e-5 * scale), **times}
-        runs.append(study.run(f"multiscale_{grid:g}_{grains}_{replicate}", "in.multiscale", variables, ["compare/bed"], packings,
-                              grains=grains, threads=1))
-    points = runs[0].points
-    return Side(f"multiscale, {points} x {grains}", runs, [answer(run, "multiscale") for run in runs], points * grains)
+    if study.size != "tiny":
+        draw(study, fulls[0], sides[-1])
 
 
 def answer(run, side):

@@ -2,58 +2,41 @@
 """(b) Biaxial compression between rough plates; friction heats the grains."""
 import numpy as np
 
-from comparison import BLUE, RED, Side, arrays, curve_band, exact_step, lagrangian, plt
+from comparison import BLUE, RED, Scene, arrays, curve_band, lagrangian, plt
 from cut import cut_block, write_data, write_groups
 
-WIDTH, HEIGHT, PRESSURE, SPEED, DENSITY, RADIUS, FULL = 0.75, 1.0, 5e4, 0.1, 2650, (0.003, 0.006), 10000
-GRAINS = dict(pressure=PRESSURE, preparation_friction=0.01, density=DENSITY, kn=1e7, kt=1e7, thickness=1)
-BOX = (-0.5, 1.25, -0.2, 1.2)
+WIDTH, HEIGHT, PRESSURE, SPEED, DENSITY = 0.75, 1.0, 5e4, 0.1, 2650
 CELL = 0.125  # on which fields are compared
 LINES = np.arange(0, WIDTH + 1e-9, CELL), np.arange(0, HEIGHT + 1e-9, CELL)
-# edge of a point, edge of the grid's cells, grains of a packing
-LEVELS = [(0.125, 0.25, 100), (0.0625, 0.125, 36), (0.0625, 0.125, 100), (0.0625, 0.125, 400)]
+# edge of a point, of the grid's cells, step of the points; grains of a packing
+COARSE, FINE = (dict(spacing=0.125, grid=0.25, step=5e-4), dict(spacing=0.0625, grid=0.125, step=2.5e-4))
+LEVELS = [(COARSE, 100), (FINE, 36), (FINE, 100), (FINE, 400)]
 
 
 def compare(study):
-    total, seeds = (1000, 2) if study.quick else (FULL, 3)
-    times = {"t_run": 0.4 if study.quick else 0.8}
-    scale = np.sqrt(FULL / total)
-    sizes = [total] if study.quick else [total, total // 4, total // 10, total // 30]
-    fulls = [full_dem(study, n, seeds, times) for n in sizes]
-    levels = [(0.125, 0.25, 36)] if study.quick else LEVELS
-    sides = [multiscale(study, level, scale, 1 if study.quick else 2, times) for level in levels]
+    scene = Scene("compare/biaxial", (0.003, 0.006), 10000, 1.6e-5, answer=answer,
+                  settings=dict(pressure=PRESSURE, preparation_friction=0.01, density=DENSITY, kn=1e7, kt=1e7, thickness=1))
+    slab = lambda scale: 4 * scale * np.mean(scene.radius)
+    spare = lambda scale: (1.02 * HEIGHT + 2 * slab(scale)) ** 2 / (WIDTH * HEIGHT)  # packings are square
+
+    def cut(packing, stem, scale):
+        files = {kind: stem.with_suffix(f".{kind}") for kind in ("data", "groups")}
+        grains = cut_block(packing, (WIDTH, HEIGHT), slab(scale), 1)
+        write_data(files["data"], grains, (-0.5, 1.25, -0.2, 1.2), DENSITY, 1)
+        write_groups(files["groups"], grains[3])
+        return files
+
+    sizes = {"full": (scene.total, 3, 2, LEVELS, 0.8),
+             "quick": (1000, 2, 1, [(COARSE, 36)], 0.4),
+             "tiny": (250, 1, 1, [(COARSE, 16)], 0.05)}
+    total, seeds, replicates, levels, t_run = sizes[study.size]
+    times = {"t_run": t_run, "every": max(0.01, round(t_run / 8, 2))}
+    fulls = [scene.full_dem(study, n, seeds, times, spare, cut) for n in study.sizes(total)]
+    sides = [scene.multiscale(study, size, grains, scene.scale(total), replicates, times) for size, grains in levels]
     study.compare(fulls[0], sides, fulls[1:])
-    draw(study, fulls[0], sides[-1])
-
-
-def full_dem(study, total, seeds, times):
-    scale, runs = np.sqrt(FULL / total), []
-    slab = 8 * np.mean(RADIUS) * scale / 2
-    spare = (1.02 * HEIGHT + 2 * slab) ** 2 / (WIDTH * HEIGHT)  # the packing is square
-    for seed in range(1, seeds + 1):
-        large = study.grains(f"full_{total}_{seed}", radius=tuple(scale * r for r in RADIUS), grains=round(spare * total), seed=seed, **GRAINS)
-        data, groups = (study.folder / f"block_{total}_{seed}.{kind}" for kind in ("data", "groups"))
-        grains = cut_block(large, (WIDTH, HEIGHT), slab, 1)
-        write_data(data, grains, BOX, DENSITY, 1)
-        write_groups(groups, grains[3])
-        variables = {"data": data.name, "groups": groups.name, "dt": exact_step(1.6e-5 * scale), **times}
-        runs.append(study.run(f"full_{total}_{seed}", "in.full_dem", variables, ["compare/biaxial"], [data, groups], threads=1))
-    grains = len(runs[0].dump("out/full_dem.dump")[0][1]["id"])
-    return Side(f"full DEM, {grains} grains", runs, [answer(run, "full_dem") for run in runs], grains)
-
-
-def multiscale(study, level, scale, replicates, times):
-    edge, grid, grains = level
-    runs = []
-    for replicate in range(replicates):
-        packings = [study.grains(f"rve_{grains}_{seed}", radius=tuple(scale * r for r in RADIUS), grains=grains, seed=seed, **GRAINS)
-                    for seed in range(4 * replicate + 1, 4 * replicate + 5)]
-        variables = {"packing": [p.name for p in packings], "spacing": edge, "grid": grid, "step": 5e-4 * grid / 0.25,
-                     "dt": exact_step(1.6e-5 * scale), **times}
-        runs.append(study.run(f"multiscale_{edge:g}_{grains}_{replicate}", "in.multiscale", variables, ["compare/biaxial"], packings,
-                              grains=grains, threads=1))
-    points = runs[0].points
-    return Side(f"multiscale, {points} x {grains}", runs, [answer(run, "multiscale") for run in runs], points * grains)
+    if study.size != "tiny":
+        tell_what_is_missed(study, fulls, sides)
+        draw(study, fulls[0], sides[-1])
 
 
 def answer(run, side):
@@ -68,6 +51,23 @@ def answer(run, side):
     field = lambda values: lagrangian(first["x"], first["y"], first["mass"], values, *LINES)
     return {"stress on the plate": np.array(table["stress"]) / 1e3, "widening": wide - wide[0], "frictional heat": heat - heat[0],
             "displacement": np.array([field(last[k] - first[k]) for k in "xy"]), "temperature": field(last[warm] - first[warm])}
+
+
+def tell_what_is_missed(study, fulls, sides):
+    """Size effect and localisation."""
+    peak = lambda side: float(np.mean([answer["stress on the plate"].max() for answer in side.answers]))
+    study.note("Peak of the stress on the plate: " + "; ".join(f"{side.label}: {peak(side):.0f} kPa" for side in [*fulls, *sides]) + ".")
+    share = lambda side, name, column: float(np.mean([localisation(run, name, column) for run in side.runs]))
+    study.note(f"Share of the heat in the hottest tenth of cells of {CELL / 2:g} m: {fulls[0].label}: {share(fulls[0], 'full_dem', 'f_Temp[0]'):.2f}; " +
+               "; ".join(f"{side.label}: {share(side, 'multiscale', 'f_mpm[13]'):.2f}" for side in sides) + ".")
+
+
+def localisation(run, name, column):
+    first, *_, last = [arrays(frame) for frame in run.dump(f"out/{name}.dump")]
+    lines = [np.arange(0, axis[-1] + 1e-9, CELL / 2) for axis in LINES]
+    heat, _, _ = np.histogram2d(first["x"], first["y"], bins=lines, weights=first["mass"] * (last[column] - first[column]))
+    heat = np.sort(heat.ravel())[::-1]
+    return heat[:len(heat) // 10].sum() / heat.sum()
 
 
 def draw(study, full, best):

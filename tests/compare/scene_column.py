@@ -2,59 +2,40 @@
 """(c) A dry column collapses; (d) so does one whose bonds melt (scene_melting_column)."""
 import numpy as np
 
-from comparison import BLUE, RED, Side, arrays, curve_band, exact_step, plt, smear
+from comparison import BLUE, RED, Scene, arrays, curve_band, plt, smear
 from cut import cut_column, write_data
 
-WIDTH, DENSITY, RADIUS, FULL = 1.0, 2650, (0.0032, 0.0064), 10800
-GRAINS = dict(pressure=1e4, preparation_friction=0.5, density=DENSITY, kn=1e7, kt=1e7, thickness=1)
-BOX = (-0.2, 4.0, -0.2, 1.6)
+WIDTH, DENSITY, BOX = 1.0, 2650, (-0.2, 4.0, -0.2, 1.6)
 CELL = 0.125  # of the grid on which fields are compared
 LINES = np.arange(0, 4.0 + 1e-9, CELL), np.arange(0, 1.25 + 1e-9, CELL)
-# points along an edge, edge of the grid's cells, grains of a packing
-LEVELS = [(8, 0.25, 100), (16, 0.125, 36), (16, 0.125, 100), (24, 1 / 12, 100)]
+# edge of a point, of the grid's cells, step of the points; grains of a packing
+COARSE, FINE = dict(spacing=1 / 8, grid=1 / 4, step=5e-4), dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4)
+FINEST = dict(spacing=1 / 24, grid=1 / 12, step=1 / 6000)
+LEVELS = [(COARSE, 100), (FINE, 36), (FINE, 100), (FINEST, 100)]
 
 
 def compare(study, case="dry"):
-    total, seeds = (1000, 2) if study.quick else (FULL, 3)
-    levels = [(8, 0.25, 36)] if study.quick else LEVELS
-    times = {"case": case, "t_run": 0.4 if study.quick else 0.8}
-    scale = np.sqrt(FULL / total)
-    sizes = [total] if study.quick else [total, total // 4, total // 10, total // 30]
-    like = packing(study, 100, 1, scale)
-    fulls = [full_dem(study, n, seeds, like, times) for n in sizes]
-    sides = [multiscale(study, level, scale, 1 if study.quick else 2, times) for level in levels]
+    scene = Scene("compare/column", (0.0032, 0.0064), 10800, 1.7e-5, answer=answer,
+                  settings=dict(pressure=1e4, preparation_friction=0.5, density=DENSITY, kn=1e7, kt=1e7, thickness=1))
+    sizes = {"full": (scene.total, 3, 2, LEVELS, 0.8),
+             "quick": (1000, 2, 1, [(COARSE, 36)], 0.4),
+             "tiny": (250, 1, 1, [(COARSE, 16)], 0.1)}
+    total, seeds, replicates, levels, t_run = sizes[study.size]
+    like = scene.pack(study, "rve", 100, 1, scene.scale(total))
+    spare = lambda scale: (1 + 12 * scale * np.mean(scene.radius)) ** 2  # gaps at the plates, the floor
+
+    def cut(packing, stem, scale):
+        write_data(stem.with_suffix(".data"), cut_column(packing, (WIDTH, WIDTH), like, BOX[1]), BOX, DENSITY, 3)
+        return {"data": stem.with_suffix(".data")}
+
+    times = {"case": case, "t_run": t_run, "every": max(0.01, round(t_run / 16, 2))}
+    fulls = [scene.full_dem(study, n, seeds, times, spare, cut) for n in study.sizes(total)]
+    sides = [scene.multiscale(study, size, grains, scene.scale(total), replicates, times) for size, grains in levels]
     study.compare(fulls[0], sides, fulls[1:])
-    draw(study, fulls[0], sides[-1], case)
-    pictures(study, fulls[0], sides[-1], case)
-
-
-def packing(study, grains, seed, scale):
-    return study.grains(f"rve_{grains}_{seed}", radius=tuple(scale * r for r in RADIUS), grains=grains, seed=seed, **GRAINS)
-
-
-def full_dem(study, total, seeds, like, times):
-    scale, runs = np.sqrt(FULL / total), []
-    spare = (1 + 12 * scale * np.mean(RADIUS)) ** 2  # gaps at the plates, the floor
-    for seed in range(1, seeds + 1):
-        large = study.grains(f"full_{total}_{seed}", radius=tuple(scale * r for r in RADIUS), grains=round(spare * total), seed=seed, **GRAINS)
-        path = study.folder / f"column_{total}_{seed}.data"
-        write_data(path, cut_column(large, (WIDTH, WIDTH), like, BOX[1]), BOX, DENSITY, 3)
-        variables = {"data": path.name, "dt": exact_step(1.7e-5 * scale), **times}
-        runs.append(study.run(f"full_{total}_{seed}", "in.full_dem", variables, ["compare/column"], [path], threads=1))
-    grains = len(runs[0].dump("out/full_dem.dump")[0][1]["id"])
-    return Side(f"full DEM, {grains} grains", runs, [answer(run, "full_dem") for run in runs], grains)
-
-
-def multiscale(study, level, scale, replicates, times):
-    edge, grid, grains = level
-    runs = []
-    for replicate in range(replicates):
-        packings = [packing(study, grains, 4 * replicate + seed, scale) for seed in range(1, 5)]
-        variables = {"packing": [p.name for p in packings], "spacing": WIDTH / edge, "grid": grid, "step": 5e-4 * grid / 0.25,
-                     "dt": exact_step(1.7e-5 * scale), **times}
-        runs.append(study.run(f"multiscale_{edge}_{grains}_{replicate}", "in.multiscale", variables, ["compare/column"], packings,
-                              grains=grains, threads=1))
-    return Side(f"multiscale, {edge**2} x {grains}", runs, [answer(run, "multiscale") for run in runs], edge**2 * grains)
+    if study.size != "tiny":
+        tell_of_segregation(study, fulls[0])
+        draw(study, fulls[0], sides[-1], case)
+        pictures(study, fulls[0], sides[-1], case)
 
 
 def answer(run, side):
@@ -80,6 +61,20 @@ def front(frame):
     fine = np.arange(0, 6, 0.005)
     columns = smear(frame["x"], frame["y"], frame["edge"], frame["mass"], fine, np.array([-1, 9]))[:, 0]
     return np.interp(0.99, np.cumsum(columns) / columns.sum(), fine[1:])
+
+
+def tell_of_segregation(study, full):
+    """Mean radius of the grains in the foremost and the uppermost tenth of the mass at the end, over the mean of all."""
+    ratios = {"x": [], "y": []}
+    for run in full.runs:
+        last = arrays(run.dump("out/full_dem.dump")[-1])
+        for axis, values in ratios.items():
+            order = np.argsort(last[axis])[::-1]
+            outer = order[np.cumsum(last["mass"][order]) < 0.1 * last["mass"].sum()]
+            values.append(last["radius"][outer].mean() / last["radius"].mean())
+    text = ", ".join(f"{name} {np.mean(ratios[axis]):.3f} ({min(ratios[axis]):.3f} to {max(ratios[axis]):.3f})"
+                     for axis, name in (("x", "foremost"), ("y", "uppermost")))
+    study.note(f"{full.label}: mean radius of the outer tenth of the mass at the end over that of all: {text}.")
 
 
 def draw(study, full, best, case):
