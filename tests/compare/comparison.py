@@ -9,6 +9,7 @@ import pathlib
 import sys
 
 import numpy as np
+from PIL import Image
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "verify"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent.parent / "examples" / "compare"))
@@ -122,6 +123,12 @@ class Comparison(Study):
         super().__init__(case, folder, full=size == "full")
         self.size, self.coarse_rows, self.tables = size, [], []
 
+    def save(self, figure, name):
+        """Ten thousand grains make large pictures: few colours keep them small."""
+        super().save(figure, name)
+        path = self.folder.parent / f"{name}.png"
+        Image.open(path).convert("RGB").quantize(96, dither=Image.Dither.NONE).save(path, optimize=True)
+
     def sizes(self, total):
         """Grains of the full DEMs: the reference, and such with fewer, larger grains."""
         return [total, total // 4, total // 10, total // 30] if self.full else [total]
@@ -196,14 +203,15 @@ class Comparison(Study):
         known = sorted((score(side), side.seconds) for side in coarse)
         for side in levels:
             error = score(side)
-            plain = f"{side.label}: {reference.seconds / side.seconds:.2g} times as fast as the full DEM, mean error {100 * error:.2g} %"
+            text = f"{side.label}: {reference.seconds / side.seconds:.2g} times as fast as the full DEM, mean error {100 * error:.2g} %; "
             if error < known[0][0]:
-                self.note(f"{plain}; smaller than that of every full DEM of larger grains: speed-up at equal error above {known[0][1] / side.seconds:.2g}.")
+                text += f"smaller than that of every full DEM of larger grains: speed-up at equal error above {known[0][1] / side.seconds:.2g}."
             elif error > known[-1][0]:
-                self.note(f"{plain}; larger than that of every full DEM of larger grains: speed-up at equal error below {known[-1][1] / side.seconds:.2g}.")
+                text += f"larger than that of every full DEM of larger grains: speed-up at equal error below {known[-1][1] / side.seconds:.2g}."
             else:
                 seconds = np.exp(np.interp(np.log(error), np.log([e for e, _ in known]), np.log([s for _, s in known])))
-                self.note(f"{plain}; a full DEM of larger grains has that error after {seconds:.3g} s: speed-up at equal error {seconds / side.seconds:.2g}.")
+                text += f"a full DEM of larger grains has it after {seconds:.3g} s: speed-up at equal error {seconds / side.seconds:.2g}."
+            self.note(text)
 
 
 def curve_band(axis, x, side, quantity, colour, label=None, scale=1.0, **style):

@@ -58,14 +58,14 @@ def tell_what_is_missed(study, fulls, sides):
     peak = lambda side: float(np.mean([answer["stress on the plate"].max() for answer in side.answers]))
     study.note("Peak of the stress on the plate: " + "; ".join(f"{side.label}: {peak(side):.0f} kPa" for side in [*fulls, *sides]) + ".")
     share = lambda side, name, column: float(np.mean([localisation(run, name, column) for run in side.runs]))
-    study.note(f"Share of the heat in the hottest tenth of cells of {CELL / 2:g} m: {fulls[0].label}: {share(fulls[0], 'full_dem', 'f_Temp[0]'):.2f}; " +
+    study.note(f"Share of the heat in the hottest tenth of cells of {CELL:g} m: " +
+               f"{fulls[0].label}: {share(fulls[0], 'full_dem', 'f_Temp[0]'):.2f}; " +
                "; ".join(f"{side.label}: {share(side, 'multiscale', 'f_mpm[13]'):.2f}" for side in sides) + ".")
 
 
 def localisation(run, name, column):
     first, *_, last = [arrays(frame) for frame in run.dump(f"out/{name}.dump")]
-    lines = [np.arange(0, axis[-1] + 1e-9, CELL / 2) for axis in LINES]
-    heat, _, _ = np.histogram2d(first["x"], first["y"], bins=lines, weights=first["mass"] * (last[column] - first[column]))
+    heat, _, _ = np.histogram2d(first["x"], first["y"], bins=LINES, weights=first["mass"] * (last[column] - first[column]))
     heat = np.sort(heat.ravel())[::-1]
     return heat[:len(heat) // 10].sum() / heat.sum()
 
