@@ -171,7 +171,7 @@ class Comparison(Study):
 
     def table(self, reference, levels, coarse, quantities, spread):
         lines = ["| | grains | processor seconds | of the full DEM's | " + " | ".join(quantities) + " |", "| --- " * (4 + len(quantities)) + "|"]
-        cell = lambda value: "" if value is None else f"{100 * value:.2g} %"
+        cell = lambda value: "" if value is None else f"{100 * value:.2g} %" if value < 0.995 else f"{100 * value:.0f} %"
         lines.append(f"| {reference.label}, spread | {reference.grains} | {reference.seconds:.3g} | 1 | " +
                      " | ".join(cell(spread[q]) for q in quantities) + " |")
         for side in [*levels, *coarse]:
