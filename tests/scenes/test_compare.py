@@ -12,9 +12,9 @@ from conftest import ROOT
 sys.path.insert(0, str(ROOT / "tests" / "compare"))
 from comparison import Comparison  # noqa: E402
 
-# Largest error of one quantity that even 250 grains must meet; measured: see the ids' comments.
-CASES = {"bed": ("heat in the bed", 0.3), "biaxial": ("stress on the plate", 0.5), "column": ("profile at the end", 0.5),
-         "melting_column": ("profile at the end", 0.5)}
+# Largest error of one quantity that 250 grains must meet; measured: 0.065, 0.18, 0.10, 0.07.
+CASES = {"bed": ("heat in the bed", 0.2), "biaxial": ("stress on the plate", 0.4), "column": ("profile at the end", 0.3),
+         "melting_column": ("profile at the end", 0.3)}
 
 
 @pytest.mark.parametrize("case", CASES)
