@@ -20,7 +20,7 @@ ROUNDS ?= 5#                       of make bench
 MAKEFLAGS += --no-builtin-rules
 PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
          check-cuda install clean help deps programs validate validate-thermal verify verify-full cost coupled-cost coupled-stability \
-         FORCE
+         compare FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
 # psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
@@ -193,6 +193,10 @@ coupled-cost: programs
 coupled-stability: programs $(BUILD)/tools/mpm_stability
 	$(RUN_ENV) $(PYTHON) tests/verify/coupled_stability.py
 
+# The multiscale answer against full DEM, for the same scene. Finished runs are not repeated.
+compare: programs
+	$(RUN_ENV) $(PYTHON) tests/compare/compare.py $(if $(QUICK),--quick) $(CASES)
+
 check-cuda:
 ifeq ($(strip $(NVCC)),)
 	@echo "check-cuda: nvcc not found (PATH, /usr/local/cuda/bin): the CUDA sources are not compiled"
@@ -245,6 +249,7 @@ help:
 	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
 	@echo "make coupled-cost error against processor time of rod, heated_square and biaxial (doc/verification.md), 12 minutes; CASES=rod"
 	@echo "make coupled-stability   time step against PIC fraction, shear to 10, a settled column for a million steps; 6 minutes"
+	@echo "make compare      multiscale against full DEM, error beside seconds (doc/comparison.md), an hour of one core; QUICK=1: a minute; CASES=bed"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"

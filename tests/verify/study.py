@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import pathlib
+import resource
 import shutil
 import subprocess
 import sys
@@ -29,9 +30,10 @@ THREADS = len(os.sched_getaffinity(0))
 
 @dataclasses.dataclass
 class Run:
-    """One finished run: its folder, wall seconds, and what it cost."""
+    """One finished run: its folder, wall seconds, processor seconds (user time of all its threads), and what it cost."""
     path: pathlib.Path
     seconds: float
+    processor: float
     points: int
     grains: int      # per point; 0 = continuum law
     dem_steps: int   # per packing, mean over the packings
@@ -80,6 +82,7 @@ class Study:
             begun.write_text(json.dumps({"wanted": wanted, "seconds": 0.0}))
         launch = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks)] if ranks > 1 else []
         words = [w for key, value in variables.items() for w in ("-var", key, *value)]
+        used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         code = self.go_on(name, path, script, lambda file: [*launch, program, "-in", file, *words],
                           environment(max(threads // ranks, 1)), timeout)
         if code != 0:
@@ -88,7 +91,8 @@ class Study:
         resume.merge(path)
         for file in resume.restart_files(path):
             file.unlink()
-        done = {"wanted": wanted, "seconds": round(json.loads(begun.read_text())["seconds"], 2)}
+        done = {"wanted": wanted, "seconds": round(json.loads(begun.read_text())["seconds"], 2),
+                "processor": round(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used, 2)}
         mark.write_text(json.dumps(done))
         return self.read(path, done, grains)
 
@@ -152,7 +156,7 @@ class Study:
         points = int(thermo[-1]["Atoms"][0]) if thermo and "Atoms" in thermo[-1] else 0
         particle_steps = thermo[-1].get("mpm[12]", [0])[-1] if thermo else 0
         dem_steps = round(particle_steps / (points * grains)) if points and grains else 0
-        return Run(path, done["seconds"], points, grains, dem_steps, thermo)
+        return Run(path, done["seconds"], done.get("processor", 0.0), points, grains, dem_steps, thermo)
 
     def check(self, quantity, error, bound, run, seconds=None):
         """error <= bound passes; both in the unit that the quantity's name tells. bound None: for information."""
@@ -176,14 +180,14 @@ class Study:
         plt.close(figure)
         self.figures.append(path.name)
 
-    def pack(self, name, **settings):
+    def pack(self, name, threads=THREADS, **settings):
         """A packing by dempm-pack, made once; its path."""
         path = self.folder / f"{name}.packing"
         words = [word for key, value in settings.items() for word in (key, *(value if isinstance(value, tuple) else (value,)))]
         mark = path.with_suffix(".made")
         if not (path.exists() and mark.exists() and mark.read_text() == str(words)):
             subprocess.run([str(w) for w in (BUILD / "dempm-pack", "generate", path, *words)], check=True, stdout=subprocess.PIPE,
-                           env=environment(THREADS))
+                           env=environment(threads))
             mark.write_text(str(words))
         return path
 
