@@ -23,13 +23,14 @@ MPM_INLINE void get_rows(double *const *component, int k, int dimension, MpmVec 
     if (dimension == 3 || (c < 5 && c != 2)) a[c] = mpm_vec_load(component[c] + k, n);
 }
 
-/* The lanes with large increments, one by one. */
-static void deform_large(Mpm *mpm, int k, double dt, MpmMask small, int n) {
+/* The lanes with large increments, one by one. By address: registers of vectors are another matter for the clones that call
+ * this than for this. */
+static void deform_large(Mpm *mpm, int k, double dt, const MpmMask *small, int n) {
   MpmPoints *p = &mpm->points;
   const int dimension = mpm->scene.dimension;
   for (int i = 0; i < n; i++) {
     double l[9] = {0.0}, f[9] = {0.0};
-    if (small[i]) continue;
+    if ((*small)[i]) continue;
     for (int q = 0; q < dimension * dimension; q++) {
       const int c = mpm_component(dimension, q);
       l[c] = p->velocity_gradient[c][k + i], f[c] = p->deformation_gradient[c][k + i];
@@ -58,7 +59,7 @@ MPM_INLINE void deform_four(Mpm *mpm, int k, double dt, int dimension, int n) {
     if (!all_small) f[c] = (MpmVec)(((MpmMask)f[c] & small) | ((MpmMask)old[c] & ~small));
     mpm_vec_store(f[c], deformation[c] + k, n);
   }
-  if (!all_small) deform_large(mpm, k, dt, small, n);
+  if (!all_small) deform_large(mpm, k, dt, &small, n);
 }
 
 MPM_CLONES static void deform_rows(Mpm *mpm, int first, int end, double dt) {

@@ -2,6 +2,8 @@
 /* The active grid: sparse, complete, periodic. */
 #include "mpm_help.h"
 
+#include "mpm/mpm_deform.h"
+
 static void nodes_follow_the_points_and_not_the_box(void **state) {
   (void)state;
   MpmLaw law = elastic_law(MPM_ELASTIC_3D, 1.0, 0.0);
@@ -162,6 +164,45 @@ static void stretched_cells_keep_affine_fields_and_balance(void **state) {
   law.destroy(law.content);
 }
 
+/* Increments that the short series of the exponential are not made for: all points of a row of four, and one of it. */
+static void large_increments_are_exponentials(void **state) {
+  (void)state;
+  const double A[9] = {0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0}, low[3] = {0.013, 0.02, 0.03}, angle = 0.7;
+  const int number[3] = {8, 8, 8};
+  MpmLaw law = elastic_law(MPM_ELASTIC_3D, 1e-9, 0.0);
+  for (int dimension = 2; dimension <= 3; dimension++)
+    for (int every = 1; every <= 7; every += 6) {
+      MpmScene scene = mpm_scene_default();
+      scene.dimension = dimension, scene.spacing = 0.1, scene.shape = MPM_SHAPE_GIMP, scene.transfer = MPM_TRANSFER_APIC;
+      Mpm *mpm;
+      int count;
+      MpmPoint *points = make_box(dimension, low, number, 0.05, 1.0, 1, &count);
+      OK(mpm_create(&scene, &law, NULL, &mpm));
+      for (int p = 0; p < count; p++)
+        for (int i = 0; i < dimension; i++)
+          for (int j = 0; j < dimension; j++) {
+            points[p].affine[3 * i + j] = p % every == 0 ? A[3 * i + j] : 0.0;
+            points[p].velocity[i] += points[p].affine[3 * i + j] * points[p].position[j];
+          }
+      OK(mpm_step(mpm, points, count, angle));
+      double error = 0.0;
+      for (int p = 0; p < count; p++) {
+        double expected[9], size = 0.0;
+        for (int k = 0; k < 9; k++) size = fmax(size, fabs(points[p].velocity_gradient[k]));
+        for (int k = 0; k < 9; k++) expected[k] = k % 4 == 0;
+        mpm_deform_large(points[p].velocity_gradient, angle, dimension, expected);
+        for (int k = 0; k < 9; k++) error = fmax(error, fabs(points[p].deformation_gradient[k] - expected[k]));
+        if (every > 1 || size == 0.0) continue;
+        error = fmax(error, fmax(fabs(points[p].deformation_gradient[0] - cos(angle)),
+                                 fabs(points[p].deformation_gradient[3] - sin(angle))));
+      }
+      AT_MOST(error, 1e-12);
+      free(points);
+      mpm_destroy(mpm);
+    }
+  law.destroy(law.content);
+}
+
 /* A plate presses a body by a tenth. On a grid that follows the plate the strain is the same everywhere; on one that does not,
  * the plate acts from the next node on. */
 static double spread_of_strain(int follows) {
@@ -221,6 +262,7 @@ static void wrong_stretches_are_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(stretched_cells_keep_affine_fields_and_balance),
+      cmocka_unit_test(large_increments_are_exponentials),
       cmocka_unit_test(a_grid_that_follows_a_plate_strains_the_body_evenly),
       cmocka_unit_test(wrong_stretches_are_refused),
       cmocka_unit_test(nodes_follow_the_points_and_not_the_box),
