@@ -60,8 +60,8 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
 }
 
 #ifdef RVE_MIXED
-#define ROWS {4, 8}, {2, 3} /* rve_row_doubles() */
+#define ROWS {4, 8}, {2, 4}
 #else
-#define ROWS {8, 12}, {4, 6}
+#define ROWS {8, 12}, {4, 8}
 #endif
 const RveKernels RVE_NAME(rve_kernels) = {RVE_TEXT, RVE_PACK, ROWS, run, measure};
