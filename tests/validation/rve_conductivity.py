@@ -158,8 +158,7 @@ def march(packing, dimension, folder, model, affine, share, steps):
 
 # ------------------------------------------------------------------------------------------------------ correlations
 def mean_field(solid_fraction, coordination, contact_radius, radius):
-    """Isotropic packing of equal spheres, affine temperatures, h = 2 k a: k phi Z a / (pi R) (Batchelor and O'Brien 1977;
-    Jagota and Hui 1990)."""
+    """Isotropic packing of equal spheres, affine temperatures, h = 2 k a: k phi Z a / (pi R) (after Batchelor and O'Brien 1977)."""
     return SOLID * solid_fraction * coordination * contact_radius / (math.pi * radius)
 
 
