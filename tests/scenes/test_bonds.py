@@ -355,9 +355,9 @@ def total_energy(frame, table, row_of):
 def test_energy(dempm, tangential, strength):
     """Undamped, without heat. With a tangential spring while bonds hold (a contact that is left may slide); without it also as
     bonds end."""
-    words = dict(expansion=0.0, conductivity=0.0, strength=strength, melting="none", dt=2e-7)
-    run = dempm(cluster(words, tangential) + CLUSTER_FRAME.replace("run 0", "") .replace("custom 1 ", "custom 2000 ") +
-                "thermo 2000\nrun 2000\n")
+    words = dict(expansion=0.0, conductivity=0.0, strength=strength, melting="none", dt=1e-7)
+    run = dempm(cluster(words, tangential) + CLUSTER_FRAME.replace("run 0", "") .replace("custom 1 ", "custom 4000 ") +
+                "thermo 4000\nrun 4000\n")
     (_, first), (_, end) = run.dump("end.dump")
     start, stop = (total_energy(frame, run.table, k) for k, frame in ((0, first), (-1, end)))
     intact = run.table["f_bond"][-1]
