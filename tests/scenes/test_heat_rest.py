@@ -3,8 +3,9 @@
 import math
 
 import pytest
-from test_grain_heat import (FILES, HEAD, MESH, OURS, OUTPUT, PAIR_ROWS, PLANE, box, circle, deviation, falling, grains,
-                             heat_of, last, lying, properties, still, two_grains)
+from test_grain_heat import (HEAD, OURS, OUTPUT, PAIR_ROWS, box, circle, deviation, falling, grains, heat_of, last,
+                             properties, still, two_grains)
+from test_grain_heat_walls import FILES, MESH, PLANE, lying
 
 EXPLICIT = "fix rest all heat/rest\n"
 IMPLICIT = "fix rest all heat/rest solver implicit\n"
