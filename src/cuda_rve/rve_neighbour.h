@@ -503,7 +503,8 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   rve_reorder(n, a, s);
   rve_fill_slots(n, a, s, pairs);
   for (int k = 0; k < 9; k++) head->cell_at_list[k] = head->cell[k];
-  head->reach = head->approach = 0.0;
+  head->reach = 0.0;
+  head->approach = call->resting ? 0.0 : 1e300; /* later than any row rests */
   head->stretch = 1.0;
   head->rebuilds++;
   head->steps_at_list = head->steps;

@@ -100,7 +100,7 @@ typedef struct RveCall {
   double normal_stiffness, tangential_stiffness, friction;
   double normal_viscosity, tangential_viscosity, critical_viscosity; /* per m_eff; per sqrt(m_eff) */
   double local_damping;
-  int32_t thermal, rotation, flight;
+  int32_t thermal, rotation, flight, resting;
   double expansion, reference_temperature, pipe_resistance;
   double bond_strength, bond_shear_ratio, bond_melting_temperature;
   double skin_fraction; /* of the largest radius; 0: found from the time that lists last */
