@@ -61,7 +61,9 @@ ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512 avx512_mixed)
 FUSE = -ffp-contract=fast -fexpensive-optimizations
 ISA_plain = $(FUSE)
 ISA_avx2 = $(FUSE) -mavx2 -mfma
-ISA_avx512 = $(FUSE) -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512
+# The last two were found by trial on a Zen 4: 3 to 12 % faster than gcc 12's default tuning.
+ISA_avx512 = $(FUSE) -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512 -mtune=skylake-avx512 \
+             -fno-tree-pre
 ISA_avx512_mixed = $(ISA_avx512)
 KERNEL_OBJECTS := $(if $(KERNEL_SOURCE),$(ISAS:%=$(BUILD)/isa/%.o))
 

@@ -13,9 +13,9 @@ typedef struct RveBody {
   rve_real v[3], w[3], r, m;
 } RveBody;
 
-/* What a contact does to its owner; the neighbour gets -force, and other_torque. */
+/* What a contact does to the neighbour, and to its owner, whose force is -push. */
 typedef struct RvePair {
-  rve_near force[3], torque[3], other_torque[3];
+  rve_near push[3], torque[3], other_torque[3];
 } RvePair;
 
 RVE_FN int rve_spins(RveFeatures ft) { return ft.dimension == 2 ? 1 : 3; }
@@ -64,57 +64,72 @@ RVE_FN void rve_branch(int dim, const rve_real h[9], const rve_int si[3], const 
 
 typedef RveBody RveNearBody;
 #define near_own_body rve_own_body
-#define near_neighbour_body rve_neighbour_body
 #define near_branch rve_branch
 #define near_dot rve_dot
 
-RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveBody other;
+/* Places and radii of neighbours (2D: and all else, their rows are short); then the rest. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   if (ft.dimension == 2) {
     const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1], a->velocity[0],
                                  a->velocity[1]};
     const double *const f1[4] = {a->spin[0], a->radius, ft.viscous ? a->mass : 0, 0};
     const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0), p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
-    for (int k = 0; k < 2; k++) other.s[k] = rve_int_from_bits(q.f[k]), other.v[k] = q.f[k + 2];
-    other.w[0] = p.f[0], other.r = p.f[1], other.m = p.f[2];
-  } else {
-    const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1],
-                                 (const double *)a->position[2], a->radius};
-    const double *const f1[4] = {a->velocity[0], a->velocity[1], a->velocity[2], ft.viscous ? a->mass : 0};
-    const double *const f2[4] = {a->spin[0], a->spin[1], a->spin[2], 0};
-    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0);
-    for (int k = 0; k < 3; k++) other.s[k] = rve_int_from_bits(q.f[k]);
-    other.r = q.f[3];
-    if (ft.tangential || ft.viscous) {
-      const RveQuad p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
-      for (int k = 0; k < 3; k++) other.v[k] = p.f[k];
-      other.m = p.f[3];
-    }
-    if (ft.tangential) {
-      const RveQuad t = rve_gather(a->row + 8, f2, a->neighbour, lane0);
-      for (int k = 0; k < 3; k++) other.w[k] = t.f[k];
-    }
+    for (int k = 0; k < 2; k++) other->s[k] = rve_int_from_bits(q.f[k]), other->v[k] = q.f[k + 2];
+    other->w[0] = p.f[0], other->r = p.f[1], other->m = p.f[2];
+    return;
   }
+  const double *const f[4] = {(const double *)a->position[0], (const double *)a->position[1],
+                              (const double *)a->position[2], a->radius};
+  const RveQuad q = rve_gather(a->row, f, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->s[k] = rve_int_from_bits(q.f[k]);
+  other->r = q.f[3];
+}
+
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  if (ft.dimension == 2) return;
+  const double *const f0[4] = {a->velocity[0], a->velocity[1], a->velocity[2], ft.viscous ? a->mass : 0};
+  const double *const f1[4] = {a->spin[0], a->spin[1], a->spin[2], 0};
+  const RveQuad q = rve_gather(a->row + 4, f0, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->v[k] = q.f[k];
+  other->m = q.f[3];
+  if (!ft.tangential) return;
+  const RveQuad t = rve_gather(a->row + 8, f1, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->w[k] = t.f[k];
+}
+
+/* Of what near_neighbour_place has read, what is still needed once the branch is known. */
+RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
+  kept->r = other->r;
+  if (ft.dimension == 3) return;
+  for (int k = 0; k < 2; k++) kept->v[k] = other->v[k];
+  kept->w[0] = other->w[0], kept->m = other->m;
+}
+
+RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveBody other;
+  near_neighbour_place(ft, a, lane0, &other);
+  near_neighbour_motion(ft, a, lane0, &other);
   return other;
 }
 
 /* Writes the rows (or nothing, where arrays are read directly) of the pack at lane0. */
-RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *b) {
+RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
   if (!RVE_ROWS) return;
   double *const none[4] = {0, 0, 0, 0};
   double *const rows = a->row;
+  const int stride = rve_row_doubles(dimension);
   const rve_real zero = rve_set(0.0);
   if (dimension == 2) {
     const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), b->v[0], b->v[1]}};
     const RveQuad p = {{b->w[0], b->r, b->m, zero}};
-    rve_scatter(rows, n->row, none, lane0, q);
-    rve_scatter(rows + 4, n->row, none, lane0, p);
+    rve_scatter(rows, stride, none, lane0, q);
+    rve_scatter(rows + 4, stride, none, lane0, p);
   } else {
     const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), rve_bits_from_int(b->s[2]), b->r}};
     const RveQuad p = {{b->v[0], b->v[1], b->v[2], b->m}}, t = {{b->w[0], b->w[1], b->w[2], zero}};
-    rve_scatter(rows, n->row, none, lane0, q);
-    rve_scatter(rows + 4, n->row, none, lane0, p);
-    rve_scatter(rows + 8, n->row, none, lane0, t);
+    rve_scatter(rows, stride, none, lane0, q);
+    rve_scatter(rows + 4, stride, none, lane0, p);
+    rve_scatter(rows + 8, stride, none, lane0, t);
   }
 }
 
@@ -123,38 +138,15 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArr
   double *const *const field = a->reaction_field;
   if (ft.dimension == 2) {
     double *const f[4] = {field[0], field[1], ft.tangential ? field[2] : 0, 0};
-    const RveQuad q = {{zero - p->force[0], zero - p->force[1], ft.tangential ? p->other_torque[0] : zero, zero}};
+    const RveQuad q = {{p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero}};
     rve_scatter_placed(a->reaction, f, lane0, q);
   } else {
     double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
-    double *const g[4] = {field[4], field[5], 0, 0};
     const RveQuad q = {
-        {zero - p->force[0], zero - p->force[1], zero - p->force[2], ft.tangential ? p->other_torque[0] : zero}};
+        {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero}};
     rve_scatter_placed(a->reaction, f, lane0, q);
-    if (ft.tangential) {
-      const RveQuad t = {{p->other_torque[1], p->other_torque[2], zero, zero}};
-      rve_scatter_placed(a->reaction + rve_reaction_plane(n), g, lane0, t);
-    }
-  }
-}
-
-/* Force and torque that a pack of grains gets from the slots of others. */
-RVE_FN void rve_sum_reactions(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3],
-                              rve_real torque[3]) {
-  const int block = lane0 / RVE_PACK, first = a->incoming_first[block], last = a->incoming_first[block + 1];
-  double *const *const field = a->reaction_field;
-  const double *const f[4] = {field[0], field[1], field[2], ft.dimension == 3 && ft.tangential ? field[3] : 0};
-  const RveQuad q = rve_sum_rows(a->reaction, f, a->incoming, first, last);
-  force[0] = q.f[0], force[1] = q.f[1];
-  if (ft.dimension == 2) {
-    torque[0] = q.f[2];
-  } else {
-    force[2] = q.f[2], torque[0] = q.f[3];
-    if (ft.tangential) {
-      const double *const g[4] = {field[4], field[5], 0, 0};
-      const RveQuad t = rve_sum_rows(a->reaction + rve_reaction_plane(n), g, a->incoming, first, last);
-      torque[1] = t.f[0], torque[2] = t.f[1];
-    }
+    if (ft.tangential)
+      rve_scatter_pairs(a->reaction + rve_reaction_plane(n), field + 4, lane0, p->other_torque[1], p->other_torque[2]);
   }
 }
 
@@ -198,30 +190,45 @@ RVE_FN rve_real near_neighbour_mass(const RveArrays *a, int lane0) {
   return _mm512_i32gather_pd(at, a->mass, 8);
 }
 
-RVE_FN RveNearBody near_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveNearBody other;
+/* In 2D one row has all. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
   const RveQuad p = rve_gather(a->row, 0, a->neighbour, lane0), q = rve_gather(a->row, 0, a->neighbour, lane0 + 8);
   for (int k = 0; k < ft.dimension; k++) {
-    other.s[k].half[0] = rve_int_from_bits(p.f[k]);
-    other.s[k].half[1] = rve_int_from_bits(q.f[k]);
+    other->s[k].half[0] = rve_int_from_bits(p.f[k]);
+    other->s[k].half[1] = rve_int_from_bits(q.f[k]);
   }
   if (ft.dimension == 2) {
-    for (int k = 0; k < 2; k++) other.v[k] = near_unpair(p.f[2], q.f[2], k);
-    other.w[0] = near_unpair(p.f[3], q.f[3], 0);
-    other.r = near_unpair(p.f[3], q.f[3], 1);
-    if (ft.viscous)
-      other.m = near_join(_mm512_cvtpd_ps(near_neighbour_mass(a, lane0)),
-                          _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
-    return other;
+    for (int k = 0; k < 2; k++) other->v[k] = near_unpair(p.f[2], q.f[2], k);
+    other->w[0] = near_unpair(p.f[3], q.f[3], 0);
+    other->r = near_unpair(p.f[3], q.f[3], 1);
+    return;
   }
-  other.r = near_unpair(p.f[3], q.f[3], 0);
-  if (ft.viscous) other.m = near_unpair(p.f[3], q.f[3], 1);
-  if (!ft.tangential && !ft.viscous) return other;
+  other->r = near_unpair(p.f[3], q.f[3], 0);
+  if (ft.viscous) other->m = near_unpair(p.f[3], q.f[3], 1);
+}
+
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
+  if (ft.dimension == 2) {
+    if (ft.viscous)
+      other->m = near_join(_mm512_cvtpd_ps(near_neighbour_mass(a, lane0)),
+                           _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
+    return;
+  }
   const RveQuad t = rve_gather(a->row + 4, 0, a->neighbour, lane0),
                 u = rve_gather(a->row + 4, 0, a->neighbour, lane0 + 8);
-  for (int k = 0; k < 3; k++) other.v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
-  for (int k = 0; ft.tangential && k < 3; k++) other.w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
-  return other;
+  for (int k = 0; k < 3; k++) other->v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
+  for (int k = 0; ft.tangential && k < 3; k++)
+    other->w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
+}
+
+RVE_FN void near_keep_place(RveFeatures ft, const RveNearBody *other, RveNearBody *kept) {
+  kept->r = other->r;
+  if (ft.dimension == 3) {
+    if (ft.viscous) kept->m = other->m;
+    return;
+  }
+  for (int k = 0; (ft.tangential || ft.viscous) && k < 2; k++) kept->v[k] = other->v[k];
+  if (ft.tangential) kept->w[0] = other->w[0];
 }
 
 RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
@@ -243,20 +250,20 @@ RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0)
   return other;
 }
 
-RVE_FN void rve_write_rows(int dimension, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *b) {
+RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
   double *const none[4] = {0, 0, 0, 0};
+  const int stride = rve_row_doubles(dimension);
   RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), near_pair(b->v[0], b->v[1]),
                 near_pair(b->w[0], b->r)}};
-  (void)n;
   if (dimension == 2) {
-    rve_scatter(a->row, 4, none, lane0, q);
+    rve_scatter(a->row, stride, none, lane0, q);
     return;
   }
   q.f[2] = rve_bits_from_int(b->s[2]);
   q.f[3] = near_pair(b->r, b->m);
   const RveQuad t = {{near_pair(b->v[0], b->v[1]), near_pair(b->v[2], b->w[0]), near_pair(b->w[1], b->w[2]), rve_set(0.0)}};
-  rve_scatter(a->row, 8, none, lane0, q);
-  rve_scatter(a->row + 4, 8, none, lane0, t);
+  rve_scatter(a->row, stride, none, lane0, q);
+  rve_scatter(a->row + 4, stride, none, lane0, t);
 }
 
 /* The rounding of H alone would stretch all branches of a direction alike. */
@@ -280,41 +287,14 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArr
   const rve_near zero = near_set(0.0);
   (void)n;
   if (ft.dimension == 2) {
-    const rve_near q[4] = {zero - p->force[0], zero - p->force[1], ft.tangential ? p->other_torque[0] : zero, zero};
+    const rve_near q[4] = {p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero};
     near_scatter_placed(a->reaction, lane0, q);
     return;
   }
-  const rve_near q[4] = {zero - p->force[0], zero - p->force[1], zero - p->force[2],
-                         ft.tangential ? p->other_torque[0] : zero};
+  const rve_near q[4] = {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero};
   near_scatter_placed(a->reaction, lane0, q);
   if (!ft.tangential) return;
-  const rve_near t[4] = {p->other_torque[1], p->other_torque[2], zero, zero};
-  near_scatter_placed(a->reaction + rve_reaction_plane(n), lane0, t);
-}
-
-/* Per lane: the sum of the reactions that come in, four FP32 fields at `rows`. */
-RVE_FN RveQuad near_sum_rows(const double *rows, const RveArrays *a, int lane0) {
-  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK;
-  RveFour row[RVE_SPAN];
-  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_zero();
-  for (int m = a->incoming_first[block]; m < a->incoming_first[block + 1]; m++)
-    for (int l = 0; l < RVE_SPAN; l++)
-      row[l] = rve_four_add(row[l], near_four(rows + a->incoming[m * RVE_PACK + part + l]));
-  return rve_transpose(row);
-}
-
-RVE_FN void rve_sum_reactions(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3],
-                              rve_real torque[3]) {
-  const RveQuad q = near_sum_rows(a->reaction, a, lane0);
-  force[0] = q.f[0], force[1] = q.f[1];
-  if (ft.dimension == 2) {
-    torque[0] = q.f[2];
-    return;
-  }
-  force[2] = q.f[2], torque[0] = q.f[3];
-  if (!ft.tangential) return;
-  const RveQuad t = near_sum_rows(a->reaction + rve_reaction_plane(n), a, lane0);
-  torque[1] = t.f[0], torque[2] = t.f[1];
+  near_scatter_pairs(a->reaction + rve_reaction_plane(n), lane0, p->other_torque[1], p->other_torque[2]);
 }
 
 RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3]) {
@@ -326,4 +306,59 @@ RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, i
 }
 
 #endif
+
+/* ----------------------------------------------------------------------------------------------------- both forms */
+
+/* 1 if all slots that a row of the incoming list names rest; then their reactions are 0. */
+RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) {
+  if (head->approach < a->incoming_idle[row]) return 1;
+  double until = 1e300;
+#if defined(__CUDACC__)
+  until = 0.0 - rve_largest(0.0 - a->idle_until[a->incoming[row * RVE_PACK + RVE_LANE] / RVE_PACK]);
+#else
+  for (int l = 0; l < RVE_PACK; l++) {
+    const double here = a->idle_until[a->incoming[row * RVE_PACK + l] / (RVE_PACK * RVE_REACTION)];
+    until = here < until ? here : until;
+  }
+#endif
+  a->incoming_idle[row] = until;
+  return head->approach < until;
+}
+
+/* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. */
+RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveCounts *n, const RveArrays *a, int lane0,
+                              rve_real force[3], rve_real torque[3]) {
+  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK, second = ft.dimension == 3 && ft.tangential;
+  const double *const more = second ? a->reaction + rve_reaction_plane(n) : a->reaction;
+#if defined(__CUDACC__)
+  (void)more;
+  for (int k = 0; k < 3; k++) force[k] = torque[k] = 0.0;
+#else
+  RveFour sum[RVE_SPAN];
+  RveTwo pair[RVE_SPAN];
+  for (int l = 0; l < RVE_SPAN; l++) sum[l] = rve_four_zero(), pair[l] = rve_two_zero();
+#endif
+  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
+    if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
+    const uint32_t *at = a->incoming + row * RVE_PACK + part;
+#if defined(__CUDACC__)
+    for (int k = 0; k < ft.dimension; k++) force[k] += a->reaction_field[k][at[RVE_LANE]];
+    for (int k = 0; ft.tangential && k < rve_spins(ft); k++)
+      torque[k] += a->reaction_field[ft.dimension + k][at[RVE_LANE]];
+#else
+    for (int l = 0; l < RVE_SPAN; l++) {
+      sum[l] = rve_four_add(sum[l], near_four(a->reaction + at[l]));
+      if (second) pair[l] = rve_two_add(pair[l], near_two(more + at[l] / 2));
+    }
+#endif
+  }
+#if !defined(__CUDACC__)
+  const RveQuad q = rve_transpose(sum);
+  force[0] = q.f[0], force[1] = q.f[1];
+  if (ft.dimension == 2) torque[0] = q.f[2];
+  else force[2] = q.f[2], torque[0] = q.f[3];
+  if (second) rve_unpair(pair, torque + 1);
+#endif
+}
+
 #endif

@@ -174,6 +174,7 @@ RVE_PART int rve_fly(RveFeatures ft, const RveTeam *team, const RveCall *call, R
     rve_invert(head->cell, head->inverse);
     head->stretch = after.stretch;
     head->reach = after.reach;
+    head->approach += 2.0 * head->radius_max * flight.scale_max; /* no row rests longer than that: all are looked at again */
     head->temperature = call->temperature;
     head->scale = scale;
     head->steps += call->steps;

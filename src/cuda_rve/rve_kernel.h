@@ -105,21 +105,79 @@ RVE_FN near_mask rve_breaking(const RveContactPass *c, near_mask bonded, rve_nea
   return near_and(bonded, near_or(pulled, near_less(shear * shear, trial2)));
 }
 
-/* Tangential force if nothing slid: history turned with the flow, plus the step's relative motion, in the tangent
- * plane. In: u, relative velocity of the centres; out: u, of the surfaces and tangential (2D: u[0]; 3D: only if a
- * dashpot asks). Returns |trial|^2. */
-RVE_FN rve_near rve_trial(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own,
-                          const RveNearBody *other, int lane0, rve_near lever, rve_near other_lever, const rve_near n[3],
-                          rve_near u[3], rve_near trial[3]) {
-  rve_near w[3], old[3];
-  for (int k = 0; k < rve_spins(ft); k++) {
-    w[k] = lever * own->w[k] + other_lever * other->w[k];
-    old[k] = near_load(a->shear[k], lane0);
+/* What a row of slots hands from one part of its computation to the next. In 3D the parts are loops of their own: a
+ * processor that looks a hundred instructions ahead then finds several rows to work on, and not one long chain. */
+typedef struct RveRow {
+  int lane0;
+  near_image image;
+  near_mask touch, bonded; /* touch: or bonded */
+  RveNearBody other;
+  rve_near d[2], n[3], overlap, opening, slide[3], trial[3]; /* d, the branch: 2D */
+} RveRow;
+
+/* First part: where the neighbours are, and whether any touches. */
+RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own, int lane0,
+                    RveRow *row) {
+  RveNearBody other;
+  rve_near d[3];
+  const near_image image = near_load_image(a->image, lane0);
+  near_neighbour_place(ft, a, lane0, &other);
+  near_branch(ft.dimension, c->h, own->s, other.s, image, d);
+  const rve_near square = near_dot(ft.dimension, d, d), inverse = near_inverse_sqrt(square);
+  const rve_near overlap = own->r + other.r - square * inverse;
+  row->lane0 = lane0;
+  row->touch = row->bonded = near_less(near_set(0.0), overlap);
+  if (ft.bonds) {
+    row->image = image;
+    row->bonded = near_image_any(image, RVE_IMAGE_BOND);
+    row->touch = near_or(row->touch, row->bonded);
   }
-  if (ft.dimension == 2) {
-    u[0] = n[0] * u[1] - n[1] * u[0] - w[0];
-    trial[0] = old[0] + c->kt_dt * u[0];
-    return trial[0] * trial[0];
+  near_keep_place(ft, &other, &row->other);
+  for (int k = 0; k < ft.dimension; k++) row->n[k] = d[k] * inverse;
+  for (int k = 0; ft.dimension == 2 && k < 2; k++) row->d[k] = d[k];
+  row->overlap = overlap;
+  return near_any(row->touch);
+}
+
+/* Nothing touches in this row, and what it left is 0. The margin covers the rounding of FP32. */
+RVE_FN void rve_rest(const RveHead *head, const RveArrays *a, const RveRow *row) {
+  const double cap = head->radius_max * head->scale, gap = 0.0 - near_largest(row->overlap);
+  a->idle_until[row->lane0 / RVE_PACK] = head->approach + (gap < cap ? gap : cap) - 1e-6 * cap;
+}
+
+RVE_FN void rve_clear(RveFeatures ft, const RveCounts *n, const RveArrays *a, const RveRow *row) {
+  RvePair none;
+  for (int k = 0; k < 3; k++) none.push[k] = none.torque[k] = none.other_torque[k] = near_set(0.0);
+  near_write_reaction(ft, n, a, row->lane0, &none);
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, near_set(0.0));
+}
+
+/* Second part: relative motion, and the tangential force if nothing slid: history turned with the flow, plus the step's
+ * relative motion, in the tangent plane. slide: of the surfaces, tangential (3D: only if a dashpot asks); without
+ * friction, of the centres. */
+RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own,
+                      RveRow *row) {
+  const int dim = ft.dimension;
+  const rve_near half = near_set(0.5), *const n = row->n;
+  const rve_near lever = own->r - half * row->overlap, other_lever = row->other.r - half * row->overlap;
+  rve_near u[3], w[3], old[3], trial[3];
+  near_neighbour_motion(ft, a, row->lane0, &row->other);
+  for (int k = 0; k < dim; k++) {
+    u[k] = row->other.v[k] - own->v[k];
+    if (dim == 2) u[k] = u[k] + c->rate[3 * k] * row->d[0] + c->rate[3 * k + 1] * row->d[1];
+    else
+      u[k] = u[k] + (lever + other_lever) * near_dot(3, c->rate + 3 * k, n); /* keeping d, too, takes longer */
+  }
+  if (ft.viscous) row->opening = near_dot(dim, u, n);
+  if (!ft.tangential) return;
+  for (int k = 0; k < rve_spins(ft); k++) {
+    w[k] = lever * own->w[k] + other_lever * row->other.w[k];
+    old[k] = near_load(a->shear[k], row->lane0);
+  }
+  if (dim == 2) {
+    row->slide[0] = n[0] * u[1] - n[1] * u[0] - w[0];
+    row->trial[0] = old[0] + c->kt_dt * row->slide[0];
+    return;
   }
   for (int k = 0; k < 3; k++) {
     trial[k] = old[k];
@@ -128,83 +186,116 @@ RVE_FN rve_near rve_trial(RveFeatures ft, const RveContactPass *c, const RveArra
   const rve_near cross[3] = {w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2], w[0] * n[1] - w[1] * n[0]};
   for (int k = 0; k < 3; k++) u[k] = u[k] - cross[k], trial[k] = trial[k] + c->kt_dt * u[k];
   const rve_near along = near_dot(3, trial, n);
-  for (int k = 0; k < 3; k++) trial[k] = trial[k] - along * n[k];
-  if (ft.viscous) {
-    const rve_near normal = near_dot(3, u, n);
-    for (int k = 0; k < 3; k++) u[k] = u[k] - normal * n[k];
-  }
-  return near_dot(3, trial, trial);
+  for (int k = 0; k < 3; k++) row->trial[k] = trial[k] - along * n[k];
+  for (int k = 0; ft.viscous && k < 3; k++) row->slide[k] = u[k] - row->opening * n[k];
 }
 
 /* Bonds of one row: which lanes are still bonded. Broken ones are forgotten at once. */
-RVE_FN near_mask rve_test_bonds(const RveContactPass *c, const RveArrays *a, int lane0, near_image image, near_mask bonded,
-                               rve_near overlap, rve_near radii, rve_near trial2) {
-  const near_mask broken = rve_breaking(c, bonded, overlap, radii, trial2);
-  if (near_any(broken)) near_store_image(a->image, lane0, near_image_clear(broken, image, RVE_IMAGE_BOND));
-  return near_and_not(bonded, broken);
+RVE_FN near_mask rve_test_bonds(const RveContactPass *c, const RveArrays *a, const RveNearBody *own, const RveRow *row,
+                               rve_near trial2) {
+  const near_mask broken = rve_breaking(c, row->bonded, row->overlap, own->r + row->other.r, trial2);
+  if (near_any(broken)) near_store_image(a->image, row->lane0, near_image_clear(broken, row->image, RVE_IMAGE_BOND));
+  return near_and_not(row->bonded, broken);
 }
 
-/* One row of slots: forces, history, work. */
-RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own, int lane0,
-                           rve_near *slip, rve_near *loss) {
+/* Last part: forces, history, work. */
+RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own,
+                           const RveRow *row, rve_near *slip, rve_near *loss) {
   const int dim = ft.dimension;
-  const RveNearBody other = near_neighbour_body(ft, a, lane0);
-  const near_image image = near_load_image(a->image, lane0);
-  const rve_near zero = near_set(0.0), half = near_set(0.5);
-  rve_near d[3], n[3], u[3];
-  near_branch(dim, c->h, own->s, other.s, image, d);
-  const rve_near square = near_dot(dim, d, d), inverse = near_inverse_sqrt(square), distance = square * inverse;
-  const rve_near radii = own->r + other.r, overlap = radii - distance;
-  for (int k = 0; k < dim; k++) n[k] = d[k] * inverse;
-  near_mask touch = near_less(zero, overlap), bonded = touch;
-  if (ft.bonds) bonded = near_image_any(image, RVE_IMAGE_BOND);
-  rve_near fn = c->kn * overlap, gt = zero;
-  if (ft.tangential || ft.viscous)
-    for (int k = 0; k < dim; k++) {
-      u[k] = other.v[k] - own->v[k] + c->rate[3 * k] * d[0] + c->rate[3 * k + 1] * d[1];
-      if (dim == 3) u[k] = u[k] + c->rate[3 * k + 2] * d[2];
-    }
+  const rve_near zero = near_set(0.0), half = near_set(0.5), overlap = row->overlap, *const n = row->n;
+  near_mask touch = row->touch, bonded = row->bonded;
+  rve_near fn = c->kn * overlap, gt = zero, trial2 = zero, total[3];
   if (ft.viscous) {
-    const rve_near effective = own->m * other.m / (own->m + other.m);
-    const rve_near opening = near_dot(dim, u, n), gn = c->gn * effective + c->gc * near_sqrt(effective);
+    const rve_near effective = own->m * row->other.m / (own->m + row->other.m);
+    const rve_near opening = row->opening, gn = c->gn * effective + c->gc * near_sqrt(effective);
     fn = fn - gn * opening;
-    *loss = *loss + near_keep(ft.bonds ? near_or(touch, bonded) : touch, gn * opening * opening);
+    *loss = *loss + near_keep(touch, gn * opening * opening);
     gt = c->gt * effective;
   }
   RvePair p;
-  rve_near total[3];
+  if (ft.tangential && dim == 2) trial2 = row->trial[0] * row->trial[0];
+  else if (ft.tangential) trial2 = near_dot(3, row->trial, row->trial);
+  if (ft.bonds) {
+    bonded = rve_test_bonds(c, a, own, row, trial2);
+    touch = near_or(near_less(zero, overlap), bonded);
+  }
   if (ft.tangential) {
-    const rve_near lever = own->r - half * overlap, other_lever = other.r - half * overlap;
-    rve_near trial[3], spring[3];
-    const rve_near trial2 = rve_trial(ft, c, a, own, &other, lane0, lever, other_lever, n, u, trial);
-    if (ft.bonds) {
-      bonded = rve_test_bonds(c, a, lane0, image, bonded, overlap, radii, trial2);
-      touch = near_or(touch, bonded);
-    }
+    const rve_near lever = own->r - half * overlap, other_lever = row->other.r - half * overlap;
+    rve_near spring[3];
     if (dim == 2) {
-      rve_tangential_2d(ft, c, touch, bonded, trial[0], u[0], fn, gt, spring, total, slip, loss);
+      rve_tangential_2d(ft, c, touch, bonded, row->trial[0], row->slide[0], fn, gt, spring, total, slip, loss);
       p.torque[0] = lever * total[0];
       p.other_torque[0] = other_lever * total[0];
     } else {
-      rve_tangential_3d(ft, c, touch, bonded, trial, trial2, u, fn, gt, spring, total, slip, loss);
+      rve_tangential_3d(ft, c, touch, bonded, row->trial, trial2, row->slide, fn, gt, spring, total, slip, loss);
       const rve_near cross[3] = {n[1] * total[2] - n[2] * total[1], n[2] * total[0] - n[0] * total[2],
                                  n[0] * total[1] - n[1] * total[0]};
       for (int k = 0; k < 3; k++) p.torque[k] = lever * cross[k], p.other_torque[k] = other_lever * cross[k];
     }
-    for (int k = 0; k < rve_spins(ft); k++) near_store(a->shear[k], lane0, spring[k]);
-  } else if (ft.bonds) {
-    touch = near_or(touch, rve_test_bonds(c, a, lane0, image, bonded, overlap, radii, zero));
+    for (int k = 0; k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, spring[k]);
   }
   fn = near_keep(touch, fn);
-  for (int k = 0; k < dim; k++) p.force[k] = zero - fn * n[k];
+  for (int k = 0; k < dim; k++) p.push[k] = fn * n[k];
   if (ft.tangential) {
     if (dim == 2) {
-      p.force[0] = p.force[0] - total[0] * n[1];
-      p.force[1] = p.force[1] + total[0] * n[0];
+      p.push[0] = p.push[0] + total[0] * n[1];
+      p.push[1] = p.push[1] - total[0] * n[0];
     } else
-      for (int k = 0; k < 3; k++) p.force[k] = p.force[k] + total[k];
+      for (int k = 0; k < 3; k++) p.push[k] = p.push[k] - total[k];
   }
   return p;
+}
+
+/* What a pass over contacts carries along. */
+typedef struct RveContactSums {
+  rve_near slid, lost;          /* of all contacts */
+  rve_near force[3], torque[3]; /* of one block's own slots */
+} RveContactSums;
+
+RVE_FN void rve_add_contact(RveFeatures ft, const RveContactPass *c, const RveCounts *n, const RveArrays *a,
+                            const RveNearBody *own, const RveRow *row, RveContactSums *sum) {
+  const RvePair p = rve_contact(ft, c, a, own, row, &sum->slid, &sum->lost);
+  near_write_reaction(ft, n, a, row->lane0, &p);
+  for (int k = 0; k < ft.dimension; k++) sum->force[k] = sum->force[k] - p.push[k];
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) sum->torque[k] = sum->torque[k] + p.torque[k];
+}
+
+/* The rows of one block, each part of the computation for up to RVE_CHUNK of them in turn. The block's own grains are
+ * read again where they are needed: as operands from memory they take no registers. */
+RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveCounts *n,
+                               const RveArrays *a, int block, RveContactSums *sum) {
+  for (int at = a->slot_first[block]; at < a->slot_first[block + 1];) {
+    RveRow row[RVE_CHUNK];
+    int rows = 0;
+    for (; at < a->slot_first[block + 1] && rows < RVE_CHUNK; at++) {
+      if (head->approach < a->idle_until[at]) continue;
+      const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+      if (rve_meet(ft, c, a, &own, at * RVE_PACK, &row[rows])) rows++;
+      else rve_clear(ft, n, a, &row[rows]), rve_rest(head, a, &row[rows]);
+    }
+    if (ft.tangential || ft.viscous)
+      for (int r = 0; r < rows; r++) {
+        const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+        rve_slide(ft, c, a, &own, &row[r]);
+      }
+    for (int r = 0; r < rows; r++) {
+      const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+      rve_add_contact(ft, c, n, a, &own, &row[r], sum);
+    }
+  }
+}
+
+/* The same where a row's numbers fit the registers: 2D, and a thread of CUDA. */
+RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveCounts *n,
+                             const RveArrays *a, int block, const RveNearBody *own, RveContactSums *sum) {
+  for (int at = a->slot_first[block]; at < a->slot_first[block + 1]; at++) {
+    RveRow row;
+    if (head->approach < a->idle_until[at]) continue;
+    const int touching = rve_meet(ft, c, a, own, at * RVE_PACK, &row);
+    if (ft.tangential || ft.viscous) rve_slide(ft, c, a, own, &row);
+    rve_add_contact(ft, c, n, a, own, &row, sum);
+    if (!touching) rve_rest(head, a, &row); /* asked last: the compiler may not mix what stands before and behind */
+  }
 }
 
 /* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
@@ -212,24 +303,19 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
 RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
                              const RveCounts *n, const RveArrays *a, rve_real *slip, rve_real *loss) {
   const RveContactPass c = rve_contact_pass_of(call, head, dt);
-  rve_near slid = near_set(0.0), lost = near_set(0.0);
+  RveContactSums sum;
+  sum.slid = sum.lost = near_set(0.0);
   for (int block = team->pack; block < n->blocks; block += team->packs) {
-    const int lane0 = block * RVE_PACK, last = a->slot_first[block + 1];
+    const int lane0 = block * RVE_PACK;
     const RveNearBody own = near_own_body(ft, a, lane0);
-    const int spins = ft.tangential ? rve_spins(ft) : 0;
-    rve_near force[3], torque[3];
-    for (int k = 0; k < 3; k++) force[k] = torque[k] = near_set(0.0);
-    for (int row = a->slot_first[block]; row < last; row++) {
-      const RvePair p = rve_contact(ft, &c, a, &own, row * RVE_PACK, &slid, &lost);
-      near_write_reaction(ft, n, a, row * RVE_PACK, &p);
-      for (int k = 0; k < ft.dimension; k++) force[k] = force[k] + p.force[k];
-      for (int k = 0; k < spins; k++) torque[k] = torque[k] + p.torque[k];
-    }
-    for (int k = 0; k < ft.dimension; k++) near_store(a->force[k], lane0, force[k]);
-    for (int k = 0; k < spins; k++) near_store(a->torque[k], lane0, torque[k]);
+    for (int k = 0; k < 3; k++) sum.force[k] = sum.torque[k] = near_set(0.0);
+    if (RVE_CHUNK > 1 && ft.dimension == 3) rve_contact_chunks(ft, &c, head, n, a, block, &sum);
+    else rve_contact_rows(ft, &c, head, n, a, block, &own, &sum);
+    for (int k = 0; k < ft.dimension; k++) near_store(a->force[k], lane0, sum.force[k]);
+    for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->torque[k], lane0, sum.torque[k]);
   }
-  *slip = *slip + near_sum_wide(slid);
-  *loss = *loss + near_sum_wide(lost);
+  *slip = *slip + near_sum_wide(sum.slid);
+  *loss = *loss + near_sum_wide(sum.lost);
 }
 
 /* ------------------------------------------------------------------------------------------------------ move pass */
@@ -241,55 +327,75 @@ RVE_FN rve_real rve_sign_like(rve_real magnitude, rve_real power) { /* +magnitud
 /* Cundall's damping of one component; adds the power it takes. */
 RVE_FN rve_real rve_damp(rve_real alpha, rve_real f, rve_real v) { return f - rve_sign_like(alpha, f * v) * f; }
 
-/* Sums forces, kicks, drifts. fastest: largest v^2; loss: work of local damping, J. */
+/* What a span of grains has in the move pass. */
+typedef struct RveSpanForce {
+  rve_real force[3], torque[3];
+} RveSpanForce;
+
+typedef struct RveMove {
+  rve_real drift[9], lag[9], dt, half_dt, alpha, scale;
+  int damped;
+} RveMove;
+
+/* Kicks and drifts one span of grains. fastest: largest v^2; loss: work of local damping, J. */
+RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int thermal, const RveArrays *a, int lane0,
+                     const RveSpanForce *sum, rve_real *fastest, rve_real *loss) {
+  const int dim = ft.dimension, spins = ft.tangential ? rve_spins(ft) : 0;
+  RveBody b, old;
+  for (int k = 0; k < dim; k++) old.v[k] = rve_load(a->velocity[k], lane0);
+  const rve_real per_mass = rve_load(a->inverse_mass, lane0) * m->dt;
+  for (int k = 0; k < dim; k++) {
+    const rve_real f = sum->force[k] + rve_load(a->force[k], lane0);
+    const rve_real used = m->damped ? rve_damp(m->alpha, f, old.v[k]) : f;
+    b.v[k] = old.v[k] + used * per_mass - m->lag[3 * k] * old.v[0] - m->lag[3 * k + 1] * old.v[1];
+    if (dim == 3) b.v[k] = b.v[k] - m->lag[3 * k + 2] * old.v[2];
+    rve_store(a->velocity[k], lane0, b.v[k]);
+    if (m->damped) *loss = *loss + (f - used) * (old.v[k] + b.v[k]) * m->half_dt;
+  }
+  for (int k = 0; k < spins; k++) {
+    const rve_real torque = sum->torque[k] + rve_load(a->torque[k], lane0), w = rve_load(a->spin[k], lane0);
+    const rve_real used = m->damped ? rve_damp(m->alpha, torque, w) : torque;
+    b.w[k] = w + used * rve_load(a->inverse_inertia, lane0) * m->dt;
+    rve_store(a->spin[k], lane0, b.w[k]);
+    if (m->damped) *loss = *loss + (torque - used) * (w + b.w[k]) * m->half_dt;
+  }
+  if (!ft.tangential)
+    for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], lane0);
+  *fastest = rve_max(*fastest, rve_dot(dim, b.v, b.v));
+  for (int k = 0; k < dim; k++) {
+    rve_real step = m->drift[3 * k] * b.v[0] + m->drift[3 * k + 1] * b.v[1];
+    if (dim == 3) step = step + m->drift[3 * k + 2] * b.v[2];
+    b.s[k] = rve_int_add(rve_load_int(a->position[k], lane0), rve_int_from_real(step));
+    rve_store_int(a->position[k], lane0, b.s[k]);
+  }
+  if (thermal) {
+    b.r = rve_load(a->reference_radius, lane0) * m->scale;
+    rve_store(a->radius, lane0, b.r);
+  } else {
+    b.r = rve_load(a->radius, lane0);
+  }
+  b.m = ft.viscous ? rve_load(a->mass, lane0) : rve_set(0.0);
+  rve_write_rows(dim, a, lane0, &b);
+}
+
+/* Sums forces, kicks, drifts; as with contacts, the first part runs ahead for several spans. */
 RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double scale,
                           const RveCounts *n, const RveArrays *a, rve_real *fastest, rve_real *loss) {
-  const int dim = ft.dimension, spins = ft.tangential ? rve_spins(ft) : 0, damped = call->local_damping > 0.0;
-  const rve_real dt = rve_set(call->dt), half_dt = rve_set(0.5 * call->dt), alpha = rve_set(call->local_damping);
-  rve_real drift[9], lag[9];
+  const int spans = n->blocks * RVE_PARTS, chunk = ft.dimension == 2 ? RVE_CHUNK : 1;
+  RveMove m;
+  m.dt = rve_set(call->dt), m.half_dt = rve_set(0.5 * call->dt), m.scale = rve_set(scale);
+  m.alpha = rve_set(call->local_damping), m.damped = call->local_damping > 0.0;
   for (int k = 0; k < 9; k++) {
-    drift[k] = rve_set(head->inverse[k] * call->dt * (double)RVE_ONE);
-    lag[k] = rve_set(call->gradient[k] * call->dt);
+    m.drift[k] = rve_set(head->inverse[k] * call->dt * (double)RVE_ONE);
+    m.lag[k] = rve_set(call->gradient[k] * call->dt);
   }
-  for (int span = team->pack; span < n->blocks * RVE_PARTS; span += team->packs) {
-    const int lane0 = span * RVE_SPAN;
-    rve_real f[3], t[3];
-    RveBody b, old;
-    rve_sum_reactions(ft, n, a, lane0, f, t);
-    for (int k = 0; k < dim; k++)
-      f[k] = f[k] + rve_load(a->force[k], lane0), old.v[k] = rve_load(a->velocity[k], lane0);
-    const rve_real per_mass = rve_load(a->inverse_mass, lane0) * dt;
-    for (int k = 0; k < dim; k++) {
-      const rve_real used = damped ? rve_damp(alpha, f[k], old.v[k]) : f[k];
-      b.v[k] = old.v[k] + used * per_mass - lag[3 * k] * old.v[0] - lag[3 * k + 1] * old.v[1];
-      if (dim == 3) b.v[k] = b.v[k] - lag[3 * k + 2] * old.v[2];
-      rve_store(a->velocity[k], lane0, b.v[k]);
-      if (damped) *loss = *loss + (f[k] - used) * (old.v[k] + b.v[k]) * half_dt;
-    }
-    for (int k = 0; k < spins; k++) {
-      const rve_real torque = t[k] + rve_load(a->torque[k], lane0), w = rve_load(a->spin[k], lane0);
-      const rve_real used = damped ? rve_damp(alpha, torque, w) : torque;
-      b.w[k] = w + used * rve_load(a->inverse_inertia, lane0) * dt;
-      rve_store(a->spin[k], lane0, b.w[k]);
-      if (damped) *loss = *loss + (torque - used) * (w + b.w[k]) * half_dt;
-    }
-    if (!ft.tangential)
-      for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], lane0);
-    *fastest = rve_max(*fastest, rve_dot(dim, b.v, b.v));
-    for (int k = 0; k < dim; k++) {
-      rve_real step = drift[3 * k] * b.v[0] + drift[3 * k + 1] * b.v[1];
-      if (dim == 3) step = step + drift[3 * k + 2] * b.v[2];
-      b.s[k] = rve_int_add(rve_load_int(a->position[k], lane0), rve_int_from_real(step));
-      rve_store_int(a->position[k], lane0, b.s[k]);
-    }
-    if (call->thermal) {
-      b.r = rve_load(a->reference_radius, lane0) * rve_set(scale);
-      rve_store(a->radius, lane0, b.r);
-    } else {
-      b.r = rve_load(a->radius, lane0);
-    }
-    b.m = ft.viscous ? rve_load(a->mass, lane0) : rve_set(0.0);
-    rve_write_rows(dim, n, a, lane0, &b);
+  for (int first = team->pack; first < spans; first += chunk * team->packs) {
+    const int left = (spans - first + team->packs - 1) / team->packs, many = left < chunk ? left : chunk;
+    RveSpanForce sum[RVE_CHUNK];
+    for (int q = 0; q < many; q++)
+      rve_sum_reactions(ft, head, n, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
+    for (int q = 0; q < many; q++)
+      rve_move(ft, &m, call->thermal, a, (first + q * team->packs) * RVE_SPAN, &sum[q], fastest, loss);
   }
 }
 

@@ -89,14 +89,14 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real 
 }
 
 /* flew: there are no forces. */
-RVE_FN void rve_sum_grains(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RveBody *own, int flew,
-                           RveSums *sum) {
+RVE_FN void rve_sum_grains(RveFeatures ft, const RveHead *head, const RveCounts *n, const RveArrays *a, int lane0,
+                           const RveBody *own, int flew, RveSums *sum) {
   const int dim = ft.dimension;
   rve_real f[3], t[3], p[3];
   const rve_real m = rve_load(a->mass, lane0), im = rve_load(a->inverse_inertia, lane0), half = rve_set(0.5);
   for (int k = 0; k < dim; k++) p[k] = rve_set(0.0) - m * own->v[k];
   if (!flew) {
-    rve_sum_reactions(ft, n, a, lane0, f, t);
+    rve_sum_reactions(ft, head, n, a, lane0, f, t);
     for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0);
     sum->of.resultant = sum->of.resultant + rve_sqrt(rve_dot(dim, f, f));
   }
@@ -203,7 +203,7 @@ RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call
     const RveBody own = rve_own_body(all, a, span * RVE_SPAN);
     for (int row = a->slot_first[block]; row < a->slot_first[block + 1] && !flew; row++)
       rve_sum_contact(ft, call, h, n, a, &own, row * RVE_PACK + part, &sum);
-    rve_sum_grains(ft, n, a, span * RVE_SPAN, &own, flew, &sum);
+    rve_sum_grains(ft, head, n, a, span * RVE_SPAN, &own, flew, &sum);
   }
   RveTotals total;
   for (int k = 0; k < RVE_SUMS; k++) total.all[k] = rve_team_sum(team, sum.all[k]);

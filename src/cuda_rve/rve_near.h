@@ -31,9 +31,12 @@ typedef rve_mask near_mask;
 #define near_or rve_or
 #define near_and_not rve_and_not
 #define near_any rve_any
+#define near_largest rve_largest
 #define near_select rve_select
 #define near_keep rve_keep
 #define near_sum_wide(a) (a)
+#define near_four rve_four
+#define near_two rve_two
 
 #else /* 16 lanes of FP32 beside 8 of FP64 */
 
@@ -88,6 +91,7 @@ RVE_FN near_mask near_and(near_mask a, near_mask b) { return (near_mask)(a & b);
 RVE_FN near_mask near_or(near_mask a, near_mask b) { return (near_mask)(a | b); }
 RVE_FN near_mask near_and_not(near_mask a, near_mask b) { return (near_mask)(a & ~b); }
 RVE_FN int near_any(near_mask a) { return a != 0; }
+RVE_FN double near_largest(rve_near a) { return (double)_mm512_reduce_max_ps(a); }
 RVE_FN rve_near near_select(near_mask m, rve_near a, rve_near b) { return _mm512_mask_blend_ps(m, b, a); }
 RVE_FN rve_near near_keep(near_mask m, rve_near a) { return _mm512_maskz_mov_ps(m, a); }
 /* Both halves of a sum in FP64, on the lanes of one. */
@@ -120,7 +124,15 @@ RVE_FN void near_scatter_placed(double *rows, int lane0, const rve_near field[4]
                            _mm512_unpackhi_pd(b, d)};
   for (int k = 0; k < 4; k++) rve_store(rows, 2 * lane0 + 8 * k, row[k]);
 }
-/* Four FP32 fields of one row, as FP64. */
+/* The same for two fields. */
+RVE_FN void near_scatter_pairs(double *rows, int lane0, rve_near a, rve_near b) {
+  const __m512i first = _mm512_setr_epi32(0, 16, 4, 20, 8, 24, 12, 28, 1, 17, 5, 21, 9, 25, 13, 29);
+  const __m512i second = _mm512_add_epi32(first, _mm512_set1_epi32(2));
+  rve_store(rows, lane0, _mm512_castps_pd(_mm512_permutex2var_ps(a, first, b)));
+  rve_store(rows, lane0 + 8, _mm512_castps_pd(_mm512_permutex2var_ps(a, second, b)));
+}
+/* Two FP32 fields of one row, as FP64; four. */
+RVE_FN RveTwo near_two(const double *at) { return _mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd(at))); }
 RVE_FN RveFour near_four(const double *at) { return _mm256_cvtps_pd(_mm_castpd_ps(_mm_load_pd(at))); }
 
 #endif

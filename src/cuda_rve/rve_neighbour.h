@@ -7,6 +7,7 @@
 #include "rve_state.h"
 
 enum { RVE_SEARCH_CHUNK = 32 };
+#define RVE_NEAR_SKIN 0.02 /* of the skin: pairs closer than this share rows with contacts */
 
 RVE_FN double rve_row_norm(const double m[9], int row) {
   return sqrt(m[3 * row] * m[3 * row] + m[3 * row + 1] * m[3 * row + 1] + m[3 * row + 2] * m[3 * row + 2]);
@@ -180,11 +181,11 @@ RVE_FN int rve_find_saved(const RveScratch *s, int i, int j, const int p[3], int
 /* ----------------------------------------------------------------------------------------------------------------
  * search */
 
-RVE_FN int rve_add_pair(RveScratch *s, int count, int i, int j, const int p[3]) {
+RVE_FN int rve_add_pair(RveScratch *s, int count, int i, int j, const int p[3], int far) {
   if (count < s->pairs) {
     s->first[count] = i;
     s->second[count] = j;
-    s->image[count] = rve_image_pack(p);
+    s->image[count] = (uint16_t)(rve_image_pack(p) | (far ? RVE_IMAGE_FAR : 0));
   }
   return count + 1;
 }
@@ -227,25 +228,28 @@ RVE_FN double rve_round(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
 RVE_FN int rve_search_wide(const RveHead *head, const RveCounts *n, RveScratch *s, double window) {
   const int grains = n->grains;
   const double *x = s->sorted[0], *y = s->sorted[1], *z = s->sorted[2], *r = s->sorted[3], *h = head->cell;
+  const double shell = (1.0 - RVE_NEAR_SKIN) * head->skin;
   int count = 0;
   for (int p = 0; p < grains; p++) {
     const double xp = x[p], yp = y[p], zp = z[p], rp = r[p] + head->skin;
     for (int q0 = p + 1; x[q0] - xp <= window; q0 += RVE_SEARCH_CHUNK) {
-      int hit[RVE_SEARCH_CHUNK], any = 0;
+      int hit[RVE_SEARCH_CHUNK], far[RVE_SEARCH_CHUNK], any = 0;
       for (int l = 0; l < RVE_SEARCH_CHUNK; l++) {
         const double u = x[q0 + l] - xp;
         double v = y[q0 + l] - yp, w = z[q0 + l] - zp;
         v -= rve_round(v), w -= rve_round(w);
         const double dx = h[0] * u + h[1] * v + h[2] * w, dy = h[3] * u + h[4] * v + h[5] * w;
-        const double dz = h[6] * u + h[7] * v + h[8] * w, reach = rp + r[q0 + l];
-        hit[l] = dx * dx + dy * dy + dz * dz < reach * reach;
+        const double dz = h[6] * u + h[7] * v + h[8] * w, reach = rp + r[q0 + l], inner = reach - shell;
+        const double square = dx * dx + dy * dy + dz * dz;
+        hit[l] = square < reach * reach;
+        far[l] = square >= inner * inner;
         any |= hit[l];
       }
       if (!any) continue;
       for (int l = 0; l < RVE_SEARCH_CHUNK; l++)
         if (hit[l]) {
           const int q = q0 + l, image[3] = {q >= grains, -(int)rve_round(y[q] - yp), -(int)rve_round(z[q] - zp)};
-          count = rve_add_pair(s, count, s->order[p], s->order[q >= grains ? q - grains : q], image);
+          count = rve_add_pair(s, count, s->order[p], s->order[q >= grains ? q - grains : q], image, far[l]);
         }
     }
   }
@@ -256,7 +260,7 @@ RVE_FN int rve_search_wide(const RveHead *head, const RveCounts *n, RveScratch *
  * grains, and for a grain with itself the half space of shifts. Returns -1 if a shift does not fit. */
 RVE_FN int rve_search_narrow(const RveHead *head, const RveCounts *n, RveScratch *s, const double window[3]) {
   const int grains = n->grains;
-  const double *h = head->cell;
+  const double *h = head->cell, shell = (1.0 - RVE_NEAR_SKIN) * head->skin;
   int count = 0;
   for (int p = 0; p < grains; p++)
     for (int wraps = 0; wraps <= (int)window[0] + 1; wraps++)
@@ -273,10 +277,11 @@ RVE_FN int rve_search_narrow(const RveHead *head, const RveCounts *n, RveScratch
             const double v = v0 + py, w = w0 + pz, reach = s->sorted[3][p] + s->sorted[3][q] + head->skin;
             const double dx = h[0] * u + h[1] * v + h[2] * w, dy = h[3] * u + h[4] * v + h[5] * w;
             const double dz = h[6] * u + h[7] * v + h[8] * w;
-            if (!(dx * dx + dy * dy + dz * dz < reach * reach)) continue;
+            const double square = dx * dx + dy * dy + dz * dz, inner = reach - shell;
+            if (!(square < reach * reach)) continue;
             const int image[3] = {wraps, py, pz};
             if (!rve_image_fits(image)) return -1;
-            count = rve_add_pair(s, count, s->order[p], s->order[q], image);
+            count = rve_add_pair(s, count, s->order[p], s->order[q], image, square >= inner * inner);
           }
       }
   return count;
@@ -296,13 +301,15 @@ RVE_FN int rve_search(const RveHead *head, const RveCounts *n, const RveArrays *
 /* -------------------------------------------------------------------------------------------------------------- new
  * list */
 
-/* Gives each pair to one of its grains so that out-degrees differ little. */
+/* Gives each pair to one of its grains so that out-degrees differ little, of near and of far pairs. */
 RVE_FN void rve_balance(const RveCounts *n, RveScratch *s, int pairs) {
-  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->in[i] = 0;
+  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->out_far[i] = s->in[i] = s->in_far[i] = 0;
   for (int pass = 0; pass < 4; pass++)
     for (int c = 0; c < pairs; c++) {
       const int i = s->first[c], j = s->second[c];
-      const int swap = pass == 0 ? s->out[j] < s->out[i] : s->out[i] > s->out[j] + 1;
+      const int far = s->image[c] & RVE_IMAGE_FAR;
+      int32_t *const out = far ? s->out_far : s->out, *const in = far && n->dimension == 3 ? s->in_far : s->in;
+      const int swap = pass == 0 ? out[j] < out[i] : out[i] > out[j] + 1;
       if (swap) {
         int p[3];
         rve_image_unpack(s->image[c], p);
@@ -310,18 +317,29 @@ RVE_FN void rve_balance(const RveCounts *n, RveScratch *s, int pairs) {
         s->first[c] = j, s->second[c] = i;
         s->image[c] = (uint16_t)(rve_image_pack(p) | (s->image[c] & 0xf000));
       }
-      if (pass > 0 && swap) s->out[i]--, s->in[j]--;
-      if (pass == 0 || swap) s->out[s->first[c]]++, s->in[s->second[c]]++;
+      if (pass > 0 && swap) out[i]--, in[j]--;
+      if (pass == 0 || swap) out[s->first[c]]++, in[s->second[c]]++;
     }
 }
 
-/* rank[new] = old grain, by out-degree, then in-degree, both falling; stable. place[old] = new. Returns rows needed. */
+/* Largest degree among a block's grains. */
+RVE_FN int rve_most(const RveScratch *s, const int32_t *degree, int block) {
+  int most = 0;
+  for (int lane = 0; lane < RVE_PACK; lane++) {
+    const int here = degree[s->rank[block * RVE_PACK + lane]];
+    most = here > most ? here : most;
+  }
+  return most;
+}
+
+/* rank[new] = old grain, by out-degree (near, then far pairs), then in-degree, all falling; stable. place[old] = new.
+ * Returns rows needed. */
 RVE_FN void rve_rank(const RveCounts *n, RveScratch *s, int *slot_rows, int *incoming_rows) {
   const int grains = n->grains, padded = n->blocks * RVE_PACK;
-  const int32_t *const key[2] = {s->in, s->out};
+  const int32_t *const key[3] = {s->in, s->out_far, s->out};
   int32_t *from = s->order, *to = s->rank;
   for (int i = 0; i < grains; i++) from[i] = i;
-  for (int round = 0; round < 2; round++) { /* counting sort, least significant key first */
+  for (int round = 0; round < 3; round++) { /* counting sort, least significant key first */
     int most = 0;
     for (int i = 0; i < grains; i++) most = key[round][i] > most ? key[round][i] : most;
     most = most < grains ? most : grains; /* buckets: higher degrees share the last one */
@@ -339,19 +357,14 @@ RVE_FN void rve_rank(const RveCounts *n, RveScratch *s, int *slot_rows, int *inc
     int32_t *const swap = from;
     from = to, to = swap;
   }
-  for (int q = 0; q < grains; q++) s->rank[q] = s->order[q]; /* after two rounds the result is in `order` */
+  /* after three rounds the result is in `rank` */
   for (int q = grains; q < padded; q++) s->rank[q] = q;
   for (int q = 0; q < padded; q++) s->place[s->rank[q]] = q;
   *slot_rows = *incoming_rows = 0;
   for (int block = 0; block < n->blocks; block++) {
-    int out = 0, in = 0;
-    for (int lane = 0; lane < RVE_PACK; lane++) {
-      const int i = s->rank[block * RVE_PACK + lane];
-      out = s->out[i] > out ? s->out[i] : out;
-      in = s->in[i] > in ? s->in[i] : in;
-    }
-    *slot_rows += out;
-    *incoming_rows += in;
+    s->out_rows[block] = rve_most(s, s->out, block), s->in_rows[block] = rve_most(s, s->in, block);
+    *slot_rows += s->out_rows[block] + rve_most(s, s->out_far, block);
+    *incoming_rows += s->in_rows[block] + rve_most(s, s->in_far, block);
   }
 }
 
@@ -382,16 +395,16 @@ RVE_FN void rve_reorder(const RveCounts *n, const RveArrays *a, RveScratch *s) {
 
 /* Writes slots, histories and incoming lists of the new order. */
 RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s, int pairs) {
-  const int stride = n->row ? n->row : 1, width = n->reaction ? n->reaction / (n->dimension - 1) : 1, spins = n->dimension == 2 ? 1 : 3;
+  const int stride = n->row ? n->row : 1, width = n->reaction ? rve_reaction_width(n) : 1;
+  const int spins = n->dimension == 2 ? 1 : 3;
   int slots = 0, incoming = 0;
   for (int block = 0; block < n->blocks; block++) {
-    int out = 0, in = 0;
+    const int out = s->out_rows[block] + rve_most(s, s->out_far, block);
+    const int in = s->in_rows[block] + rve_most(s, s->in_far, block);
     a->slot_first[block] = slots, a->incoming_first[block] = incoming;
-    for (int lane = 0; lane < RVE_PACK; lane++) {
-      const int i = s->rank[block * RVE_PACK + lane];
-      out = s->out[i] > out ? s->out[i] : out;
-      in = s->in[i] > in ? s->in[i] : in;
-    }
+    a->incoming_far[block] = incoming + s->in_rows[block];
+    for (int row = slots; row < slots + out; row++) a->idle_until[row] = 0.0;
+    for (int row = incoming; row < incoming + in; row++) a->incoming_idle[row] = 0.0;
     for (int slot = slots * RVE_PACK; slot < (slots + out) * RVE_PACK; slot++) {
       a->neighbour[slot] = (uint32_t)((block * RVE_PACK + slot % RVE_PACK) * stride);
       a->image[slot] = RVE_IMAGE_EMPTY | RVE_IMAGE_VOID;
@@ -402,13 +415,17 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
     slots += out, incoming += in;
   }
   a->slot_first[n->blocks] = slots, a->incoming_first[n->blocks] = incoming;
-  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->in[i] = 0;
+  a->idle_until[n->slot_rows] = 1e300;
+  for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->out_far[i] = s->in[i] = s->in_far[i] = 0;
   for (int c = 0; c < pairs; c++) {
     const int i = s->place[s->first[c]], j = s->place[s->second[c]], old = s->history[c];
-    const int slot = (a->slot_first[i / RVE_PACK] + s->out[i]++) * RVE_PACK + i % RVE_PACK;
+    const int far = s->image[c] & RVE_IMAGE_FAR;
+    const int row = far ? s->out_rows[i / RVE_PACK] + s->out_far[i]++ : s->out[i]++;
+    const int slot = (a->slot_first[i / RVE_PACK] + row) * RVE_PACK + i % RVE_PACK;
+    const int in = far && n->dimension == 3 ? s->in_rows[j / RVE_PACK] + s->in_far[j]++ : s->in[j]++;
     a->neighbour[slot] = (uint32_t)(j * stride);
-    a->image[slot] = s->image[c];
-    a->incoming[(a->incoming_first[j / RVE_PACK] + s->in[j]++) * RVE_PACK + j % RVE_PACK] =
+    a->image[slot] = s->image[c] & (uint16_t)~RVE_IMAGE_FAR;
+    a->incoming[(a->incoming_first[j / RVE_PACK] + in) * RVE_PACK + j % RVE_PACK] =
         (uint32_t)(rve_place(RVE_PACK, slot) * width);
     if (old < 0) continue;
     /* Seen from the other grain the force changes sign; in 2D the tangent (-n_y, n_x) does too. */
@@ -428,7 +445,7 @@ RVE_FN int rve_attach_saved(const RveCounts *n, RveScratch *s, int pairs, int sa
     rve_image_unpack(s->image[c], p);
     const int old = s->history[c] = rve_find_saved(s, s->first[c], s->second[c], p, &flipped);
     if (old < 0) continue;
-    s->image[c] |= s->old_image[old] & RVE_IMAGE_BOND;
+    s->image[c] = (uint16_t)((s->image[c] & ~RVE_IMAGE_FAR) | (s->old_image[old] & RVE_IMAGE_BOND));
     s->old_image[old] |= RVE_IMAGE_VOID; /* found */
   }
   if (saved == 0) {
@@ -487,6 +504,7 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   rve_fill_slots(n, a, s, pairs);
   for (int k = 0; k < 9; k++) head->cell_at_list[k] = head->cell[k];
   head->reach = 0.0;
+  head->approach = call->resting ? 0.0 : 1e300; /* later than any row rests */
   head->stretch = 1.0;
   head->rebuilds++;
   head->steps_at_list = head->steps;

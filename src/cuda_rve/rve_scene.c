@@ -24,7 +24,7 @@ RveScene rve_scene_default(void) {
   scene.bond_melting_temperature = INFINITY;
   scene.time_step_fraction = 0.5;
   scene.share = 1;
-  scene.flight = 1;
+  scene.flight = scene.resting = 1;
   return scene;
 }
 
@@ -100,6 +100,7 @@ static BaseStatus check_steps(const RveScene *scene) {
   TRY(flag("mixed", scene->mixed));
   TRY(flag("share", scene->share));
   TRY(flag("flight", scene->flight));
+  TRY(flag("resting", scene->resting));
   if (scene->threads < 0) return outside("threads", scene->threads, ">= 0");
   return BASE_OK;
 }
@@ -151,6 +152,7 @@ static void call_material(const RveScene *scene, RveCall *call) {
   call->skin_fraction = scene->skin;
   call->thickness = scene->dimension == 2 ? scene->thickness : 1.0;
   call->flight = scene->flight;
+  call->resting = scene->resting;
 }
 
 /* exp(factor a) - 1. Small ones by their own series: adding the unit first would round away what thousands of steps add up. */

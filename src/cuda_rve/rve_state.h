@@ -8,7 +8,10 @@
  * The list. Grains are sorted by degree and dealt in blocks of `lanes`; grain i of block b owns the slots (row, i mod
  * lanes) of the rows slot_first[b] .. slot_first[b+1]. Each contact has exactly one slot, at the grain that "owns" it
  * (degrees are balanced); the other grain finds it in its incoming list. A slot without contact names its own grain,
- * many cells away. */
+ * many cells away.
+ *
+ * Pairs that touch or nearly do come first in a block's rows, the others have rows of their own. A row of which no pair
+ * touches rests until its nearest pair may: idle_until says when, on the clock of RveHead.approach. */
 #ifndef DEMPM_RVE_STATE_H
 #define DEMPM_RVE_STATE_H
 
@@ -22,7 +25,8 @@ enum {
   RVE_IMAGE_MAX = 5,        /* |P| of a contact in a reduced cell; more means the cell is too narrow */
   RVE_IMAGE_EMPTY = 6,      /* P_x of an empty slot */
   RVE_IMAGE_BOND = 1 << 12, /* intact bond */
-  RVE_IMAGE_VOID = 1 << 13  /* empty slot */
+  RVE_IMAGE_VOID = 1 << 13, /* empty slot */
+  RVE_IMAGE_FAR = 1 << 14   /* only while a list is built: no contact for some time to come */
 };
 
 enum { RVE_LIST_GOOD, RVE_LIST_CHECK /* its running bound is spent */, RVE_LIST_ABSENT /* must be built */ };
@@ -31,7 +35,7 @@ typedef struct RveCounts {
   int32_t dimension, grains, lanes, blocks;
   int32_t slot_rows, incoming_rows; /* capacity, in rows of `lanes` */
   int32_t row;                      /* doubles per grain's row, a multiple of 4; 0: no rows (CUDA) */
-  int32_t reaction;                 /* doubles per slot's reaction: 4 in FP64, 2 in FP32, twice that in 3D; 0: arrays */
+  int32_t reaction; /* doubles per slot's reaction: 4 in FP64, 2 in FP32, half as many more in 3D; 0: arrays */
 } RveCounts;
 
 /* Everything about an RVE that is not an array. Plain values only: it is copied and stored raw. */
@@ -55,6 +59,7 @@ typedef struct RveHead {
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
   int32_t apart;    /* no grains touch, no bond holds and no force is left: the next call may be a free flight */
   int32_t flew;     /* the last call was one */
+  double approach;   /* m: no gap between two grains has shrunk by more since the list was built; never falls */
 } RveHead;
 
 /* Arrays of an arena. N = blocks * lanes grains (the last ones are massless padding). [k] counts components. */
@@ -70,11 +75,14 @@ typedef struct RveArrays {
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist) */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
-  double *reaction;    /* [plane][slot + lanes] four numbers each: force and torque on the neighbour (2D f t, 3D f t_x |
-                          t_y t_z), at rve_place() of the slot; the last ones of a plane stay zero */
+  double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_place() of the slot: a plane of four
+                          numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z); the last slots stay zero */
   double *reaction_field[6];            /* the same as arrays, if counts.reaction = 0 */
   uint32_t *incoming;                   /* [incoming] slot (its place in doubles, if counts.reaction > 0) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
+  int32_t *incoming_far; /* [blocks] first row that names far pairs only */
+  double *idle_until;    /* [row of slots, one more] m: no contact, forces, histories are 0 while approach is below */
+  double *incoming_idle; /* [row of incoming] the same for all its slots; may lag behind */
 } RveArrays;
 
 /* What all steps of one call share. Deformation is given per DEM step: gradient * dt may differ from L * duration /
@@ -92,7 +100,7 @@ typedef struct RveCall {
   double normal_stiffness, tangential_stiffness, friction;
   double normal_viscosity, tangential_viscosity, critical_viscosity; /* per m_eff; per sqrt(m_eff) */
   double local_damping;
-  int32_t thermal, rotation, flight;
+  int32_t thermal, rotation, flight, resting;
   double expansion, reference_temperature, pipe_resistance;
   double bond_strength, bond_shear_ratio, bond_melting_temperature;
   double skin_fraction; /* of the largest radius; 0: found from the time that lists last */
@@ -112,7 +120,9 @@ typedef struct RveScratch {
   int32_t *old_second, *old_next;    /* [pairs] saved contacts, chained by first grain */
   uint16_t *old_image;
   double *old_shear[3];
-  int32_t *chain, *order, *bucket, *out, *in, *rank, *place; /* [N + 2] */
+  int32_t *chain, *order, *bucket, *rank, *place; /* [N + 2] */
+  int32_t *out, *in, *out_far, *in_far;           /* [N + 2] pairs of a grain, near and far */
+  int32_t *out_rows, *in_rows;                    /* [N + 2] a block's rows of near pairs */
   double *sorted[4]; /* [2 N + 64] fractional coordinates and radius, sorted along the first */
   double *swap;      /* [N] */
 } RveScratch;
@@ -153,20 +163,24 @@ RVE_ANY size_t rve_layout(const RveCounts *n, void *base, RveArrays *a) {
   a->incoming = (uint32_t *)rve_carve(base, &used, (size_t)n->incoming_rows * (size_t)n->lanes * 4);
   a->slot_first = (int32_t *)rve_carve(base, &used, ((size_t)n->blocks + 1) * 4);
   a->incoming_first = (int32_t *)rve_carve(base, &used, ((size_t)n->blocks + 1) * 4);
+  a->incoming_far = (int32_t *)rve_carve(base, &used, (size_t)n->blocks * 4);
+  a->idle_until = (double *)rve_carve(base, &used, ((size_t)n->slot_rows + 1) * 8);
+  a->incoming_idle = (double *)rve_carve(base, &used, (size_t)n->incoming_rows * 8);
   return used;
 }
 
 RVE_ANY size_t rve_scratch_layout(const RveCounts *n, int32_t pairs, void *base, RveScratch *s) {
   const size_t grains = (size_t)n->blocks * (size_t)n->lanes, p = (size_t)pairs;
   int32_t **const per_pair[] = {&s->first, &s->second, &s->history, &s->old_second, &s->old_next};
-  int32_t **const per_grain[] = {&s->chain, &s->order, &s->bucket, &s->out, &s->in, &s->rank, &s->place};
+  int32_t **const per_grain[] = {&s->chain, &s->order,   &s->bucket, &s->rank,     &s->place,  &s->out,
+                                 &s->in,    &s->out_far, &s->in_far, &s->out_rows, &s->in_rows};
   size_t used = 0;
   s->pairs = pairs;
   for (int k = 0; k < 5; k++) *per_pair[k] = (int32_t *)rve_carve(base, &used, p * 4);
   s->image = (uint16_t *)rve_carve(base, &used, p * 2);
   s->old_image = (uint16_t *)rve_carve(base, &used, p * 2);
   for (int k = 0; k < 3; k++) s->old_shear[k] = (double *)rve_carve(base, &used, p * 8);
-  for (int k = 0; k < 7; k++) *per_grain[k] = (int32_t *)rve_carve(base, &used, (grains + 2) * 4);
+  for (int k = 0; k < 11; k++) *per_grain[k] = (int32_t *)rve_carve(base, &used, (grains + 2) * 4);
   for (int k = 0; k < 4; k++) s->sorted[k] = (double *)rve_carve(base, &used, (2 * grains + 64) * 8);
   s->swap = (double *)rve_carve(base, &used, grains * 8);
   return used;
@@ -183,9 +197,11 @@ RVE_ANY int rve_image_fits(const int p[3]) {
     if (p[k] < -RVE_IMAGE_MAX || p[k] > RVE_IMAGE_MAX) return 0;
   return 1;
 }
-/* Doubles from one plane of reactions to the next. */
+/* Doubles of a slot in the first plane of reactions; half as many in the second. */
+RVE_ANY int rve_reaction_width(const RveCounts *n) { return n->dimension == 2 ? n->reaction : n->reaction / 3 * 2; }
+/* Doubles from the first plane of reactions to the second. */
 RVE_ANY size_t rve_reaction_plane(const RveCounts *n) {
-  return ((size_t)n->slot_rows + 1) * (size_t)n->lanes * (size_t)(n->reaction / (n->dimension - 1));
+  return ((size_t)n->slot_rows + 1) * (size_t)n->lanes * (size_t)rve_reaction_width(n);
 }
 RVE_ANY RveHead *rve_head(void *arena) { return (RveHead *)arena; }
 

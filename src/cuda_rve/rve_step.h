@@ -23,9 +23,14 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
     rve_invert(h, head->inverse);
     head->stretch /= call->shorten;
   }
+  const double scale = rve_radius_factor(call, temperature), grown = scale > head->scale ? scale - head->scale : 0.0;
   head->reach = head->reach * call->shorten + sqrt(fastest) * call->dt;
+  /* Gaps that count are narrower than a large grain's radius: no branch is longer than three. */
+  head->approach += (2.0 * call->shorten * sqrt(fastest) * call->dt +
+                     head->radius_max * (3.0 * scale * (call->shorten - 1.0) + 2.0 * grown)) *
+                    (1.0 + 1e-9);
   head->temperature = temperature;
-  head->scale = rve_radius_factor(call, temperature);
+  head->scale = scale;
   head->steps++;
   head->done++;
   head->list_due = rve_list_is_spent(head) ? RVE_LIST_CHECK : RVE_LIST_GOOD;
@@ -42,7 +47,7 @@ RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCount
     if (!ft.tangential)
       for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], span * RVE_SPAN);
     if (!ft.viscous) b.m = rve_set(0.0);
-    rve_write_rows(ft.dimension, n, a, span * RVE_SPAN, &b);
+    rve_write_rows(ft.dimension, a, span * RVE_SPAN, &b);
   }
 }
 

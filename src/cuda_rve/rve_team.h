@@ -46,10 +46,14 @@ RVE_ANY int rve_place(int pack, int slot) {
 #if defined(RVE_ISA_AVX512) || defined(RVE_ISA_AVX2)
 #include <immintrin.h>
 typedef __m256d RveFour; /* four consecutive fields of a row */
+typedef __m128d RveTwo;  /* two */
 #else
 typedef struct RveFour {
   double f[4];
 } RveFour;
+typedef struct RveTwo {
+  double f[2];
+} RveTwo;
 #endif
 
 /* ------------------------------------------------------------------------------------------------ numbers, one per
@@ -92,6 +96,7 @@ RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return (rve_mask)(a & b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return (rve_mask)(a | b); }
 RVE_FN rve_mask rve_and_not(rve_mask a, rve_mask b) { return (rve_mask)(a & ~b); }
 RVE_FN int rve_any(rve_mask a) { return a != 0; }
+RVE_FN double rve_largest(rve_real a) { return _mm512_reduce_max_pd(a); }
 RVE_FN rve_real rve_select(rve_mask m, rve_real a, rve_real b) { return _mm512_mask_blend_pd(m, b, a); }
 RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm512_maskz_mov_pd(m, a); }
 
@@ -157,6 +162,10 @@ RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return _mm256_and_pd(a, b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return _mm256_or_pd(a, b); }
 RVE_FN rve_mask rve_and_not(rve_mask a, rve_mask b) { return _mm256_andnot_pd(b, a); }
 RVE_FN int rve_any(rve_mask a) { return _mm256_movemask_pd(a) != 0; }
+RVE_FN double rve_largest(rve_real a) {
+  const __m128d b = _mm_max_pd(_mm256_castpd256_pd128(a), _mm256_extractf128_pd(a, 1));
+  return _mm_cvtsd_f64(_mm_max_pd(b, _mm_unpackhi_pd(b, b)));
+}
 RVE_FN rve_real rve_select(rve_mask m, rve_real a, rve_real b) { return _mm256_blendv_pd(b, a, m); }
 RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm256_and_pd(m, a); }
 
@@ -214,7 +223,16 @@ RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return a < b; }
 RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return a & b; }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return a | b; }
 RVE_FN rve_mask rve_and_not(rve_mask a, rve_mask b) { return a & !b; }
+#if defined(__CUDACC__)
+RVE_FN int rve_any(rve_mask a) { return __any_sync(0xffffffffu, a); }
+RVE_FN double rve_largest(rve_real a) {
+  for (int distance = 16; distance > 0; distance /= 2) a = rve_max(a, __shfl_xor_sync(0xffffffffu, a, distance));
+  return a;
+}
+#else
 RVE_FN int rve_any(rve_mask a) { return a; }
+RVE_FN double rve_largest(rve_real a) { return a; }
+#endif
 RVE_FN rve_real rve_select(rve_mask m, rve_real a, rve_real b) { return m ? a : b; }
 RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return m ? a : 0.0; }
 
@@ -226,6 +244,20 @@ enum { RVE_PARTS = 2 };
 enum { RVE_PARTS = 1 };
 #endif
 enum { RVE_PACK = RVE_PARTS * RVE_SPAN };
+#if defined(__CUDACC__)
+enum { RVE_REACTION = 1 };
+#else
+enum { RVE_REACTION = 4 / RVE_PARTS }; /* doubles from one slot to the next in RveArrays.incoming */
+#endif
+
+/* RveCounts.row of these kernels. */
+RVE_FN int rve_row_doubles(int dimension) { return RVE_ROWS * 4 * (RVE_PARTS == 2 ? dimension - 1 : dimension); }
+/* Rows of slots whose contacts are computed part by part, see RveRow. */
+#if defined(__CUDACC__)
+enum { RVE_CHUNK = 1 };
+#else
+enum { RVE_CHUNK = 4 };
+#endif
 
 /* 1/sqrt(a) to round-off. */
 #if defined(RVE_ISA_AVX512)
@@ -295,6 +327,9 @@ RVE_FN RveFour rve_four(const double *at) { return _mm256_load_pd(at); }
 RVE_FN void rve_four_store(double *at, RveFour a) { _mm256_store_pd(at, a); }
 RVE_FN RveFour rve_four_add(RveFour a, RveFour b) { return _mm256_add_pd(a, b); }
 RVE_FN RveFour rve_four_zero(void) { return _mm256_setzero_pd(); }
+RVE_FN RveTwo rve_two(const double *at) { return _mm_load_pd(at); }
+RVE_FN RveTwo rve_two_add(RveTwo a, RveTwo b) { return _mm_add_pd(a, b); }
+RVE_FN RveTwo rve_two_zero(void) { return _mm_setzero_pd(); }
 #elif !defined(__CUDACC__)
 RVE_FN RveFour rve_four(const double *at) {
   RveFour a;
@@ -311,6 +346,21 @@ RVE_FN RveFour rve_four_add(RveFour a, RveFour b) {
 RVE_FN RveFour rve_four_zero(void) {
   const RveFour zero = {{0.0, 0.0, 0.0, 0.0}};
   return zero;
+}
+RVE_FN RveTwo rve_two(const double *at) {
+  const RveTwo a = {{at[0], at[1]}};
+  return a;
+}
+RVE_FN RveTwo rve_two_add(RveTwo a, RveTwo b) {
+  for (int k = 0; k < 2; k++) a.f[k] += b.f[k];
+  return a;
+}
+RVE_FN RveTwo rve_two_zero(void) {
+  const RveTwo zero = {{0.0, 0.0}};
+  return zero;
+}
+RVE_FN void rve_unpair(const RveTwo pair[1], rve_real sum[2]) {
+  for (int k = 0; k < 2; k++) sum[k] = pair[0].f[k];
 }
 RVE_FN RveQuad rve_transpose(const RveFour row[1]) {
   RveQuad q;
@@ -335,7 +385,8 @@ RVE_FN RveQuad rve_gather(const double *rows, const double *const field[4], cons
 #else
   RveFour row[RVE_SPAN];
   (void)field;
-  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four(rows + offset[lane0 + l]);
+  offset += lane0;
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four(rows + offset[l]);
   return rve_transpose(row);
 #endif
 }
@@ -351,7 +402,8 @@ RVE_FN void rve_scatter(double *rows, int stride, double *const field[4], int la
   RveFour row[RVE_SPAN];
   (void)field;
   rve_transpose_back(q, row);
-  for (int l = 0; l < RVE_SPAN; l++) rve_four_store(rows + (size_t)(lane0 + l) * (size_t)stride, row[l]);
+  rows += (size_t)lane0 * (size_t)stride;
+  for (int l = 0; l < RVE_SPAN; l++) rve_four_store(rows + l * stride, row[l]);
 #endif
 }
 
@@ -361,7 +413,8 @@ RVE_FN void rve_scatter_placed(double *rows, double *const field[4], int lane0, 
   rve_real row[4];
   (void)field;
   rve_transpose_halves(q, row);
-  for (int k = 0; k < 4; k++) rve_store(rows, 4 * lane0 + 8 * k, row[k]);
+  rows += (size_t)lane0 * 4;
+  for (int k = 0; k < 4; k++) rve_store(rows, 8 * k, row[k]);
 #else
   rve_scatter(rows, 4, field, lane0, q);
 #endif
@@ -383,28 +436,42 @@ RVE_FN RveQuad rve_read_placed(const double *rows, const double *const field[4],
 #endif
 }
 
-/* Per lane: the sum of the rows that offset[(first..last) * RVE_PACK + lane] name, in this order. */
-RVE_FN RveQuad rve_sum_rows(const double *rows, const double *const field[4], const uint32_t *offset, int first,
-                            int last) {
+/* The same for rows of two fields. */
+RVE_FN void rve_scatter_pairs(double *rows, double *const field[2], int lane0, rve_real a, rve_real b) {
 #if defined(__CUDACC__)
-  RveQuad q = {{0.0, 0.0, 0.0, 0.0}};
   (void)rows;
-  for (int m = first; m < last; m++) {
-    const uint32_t at = offset[m * RVE_PACK + RVE_LANE];
-#pragma unroll
-    for (int k = 0; k < 4; k++)
-      if (field[k]) q.f[k] += field[k][at];
-  }
-  return q;
-#else
-  RveFour row[RVE_SPAN];
+  field[0][lane0 + RVE_LANE] = a, field[1][lane0 + RVE_LANE] = b;
+#elif defined(RVE_ISA_AVX512)
   (void)field;
-  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_zero();
-  for (int m = first; m < last; m++)
-    for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four_add(row[l], rve_four(rows + offset[m * RVE_PACK + l]));
-  return rve_transpose(row);
+  rows += (size_t)lane0 * 2;
+  rve_store(rows, 0, _mm512_permutex2var_pd(a, _mm512_setr_epi64(0, 8, 4, 12, 1, 9, 5, 13), b));
+  rve_store(rows, 8, _mm512_permutex2var_pd(a, _mm512_setr_epi64(2, 10, 6, 14, 3, 11, 7, 15), b));
+#elif defined(RVE_ISA_AVX2)
+  const rve_real even = _mm256_unpacklo_pd(a, b), odd = _mm256_unpackhi_pd(a, b);
+  (void)field;
+  rve_store(rows, 2 * lane0, _mm256_permute2f128_pd(even, odd, 0x20));
+  rve_store(rows, 2 * lane0 + 4, _mm256_permute2f128_pd(even, odd, 0x31));
+#else
+  (void)field;
+  rows[2 * lane0] = a, rows[2 * lane0 + 1] = b;
 #endif
 }
+
+#if defined(RVE_ISA_AVX512) || defined(RVE_ISA_AVX2)
+/* The first and the second numbers of one pair per lane. */
+RVE_FN void rve_unpair(const RveTwo pair[RVE_SPAN], rve_real sum[2]) {
+#if defined(RVE_ISA_AVX512)
+  rve_real half[2]; /* even and odd lanes */
+  for (int k = 0; k < 2; k++)
+    half[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_set_m128d(pair[2 + k], pair[k])),
+                                 _mm256_set_m128d(pair[6 + k], pair[4 + k]), 1);
+  sum[0] = _mm512_unpacklo_pd(half[0], half[1]), sum[1] = _mm512_unpackhi_pd(half[0], half[1]);
+#else
+  const rve_real even = _mm256_set_m128d(pair[2], pair[0]), odd = _mm256_set_m128d(pair[3], pair[1]);
+  sum[0] = _mm256_unpacklo_pd(even, odd), sum[1] = _mm256_unpackhi_pd(even, odd);
+#endif
+}
+#endif
 
 /* ------------------------------------------------------------------------------------------------------- reductions */
 #if defined(__CUDACC__)

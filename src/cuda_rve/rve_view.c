@@ -8,7 +8,7 @@
 /* Force of the slot's contact on its owner, from the reaction it stored. */
 static void slot_force(const RveRecord *record, int slot, double f[3]) {
   const RveArrays *a = &record->arrays;
-  const int width = record->counts.reaction / (record->counts.dimension - 1); /* doubles, or pairs of FP32 */
+  const int width = rve_reaction_width(&record->counts); /* doubles, or pairs of FP32 */
   const double *at = a->reaction + (size_t)rve_place(record->counts.lanes, slot) * (size_t)width;
   float half[4] = {0};
   if (width == 2) memcpy(half, at, sizeof half);

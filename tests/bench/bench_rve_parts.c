@@ -8,7 +8,7 @@
  *   only       the same job in a kernel without heat, bonds, dashpots and 3D (isa.c; 2D only)
  *   viscous, bonded, thermal    the same job with this physics switched on, though nothing comes of it
  *   list_us    one list, microseconds; list_share: of the time of `full` that went into lists
- *   slots, used_slots           slots of the list per grain, and those that hold a pair
+ *   slots, used_slots           slots of the list per grain, and those that hold a pair and do not rest
  *   state_bytes                 of one RVE
  * The variants take turns, so that what else the machine does falls on all alike; medians of the rounds. */
 #include <stdio.h>
@@ -124,7 +124,9 @@ static BaseStatus bench_parts(Bench *bench, const RvePacking *packing, int round
   const RveArrays *a = &bench->record.arrays;
   const int slots = a->slot_first[n->blocks] * n->lanes;
   int used = 0;
-  for (int k = 0; k < slots; k++) used += !(a->image[k] & RVE_IMAGE_VOID);
+  const double now = rve_head(bench->record.arena)->approach;
+  for (int k = 0; k < slots; k++)
+    used += !(a->image[k] & RVE_IMAGE_VOID) && !(now < a->idle_until[k / n->lanes]);
   printf("{\"isa\": \"%s\", \"dimension\": %d, \"grains\": %d, \"rounds\": %d", bench->kernels->name, n->dimension,
          n->grains, rounds);
   const double list = median(seconds[CASES], rounds);

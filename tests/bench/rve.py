@@ -26,7 +26,7 @@ TOLERANCE = 0.04  # of an end stress, from the median of all codes: 400 grains p
 TUNING_STEPS, TUNING_TRIES = 4000, 2  # the same for all codes
 # Floating-point operations and bytes moved per particle-step, a + b * slots; counted from the kernels' source in
 # doc/performance.md, and to be counted anew when they change.
-WORK = {2: {"flop": (56, 73), "bytes": (264, 154)}, 3: {"flop": (115, 165), "bytes": (440, 282)}}
+WORK = {2: {"flop": (56, 71), "bytes": (264, 154)}, 3: {"flop": (115, 166), "bytes": (440, 250)}}
 
 
 def text(*command):
