@@ -195,6 +195,7 @@ void FixMPMCouple::init() {
   find_walls_and_tractions();
   start_points();
   set_sort_bins();
+  find_readers();
   just_created = 0; /* Modify::setup would reset the state of a new fix */
 }
 
@@ -325,6 +326,7 @@ void FixMPMCouple::create_mpm() {
 }
 
 void FixMPMCouple::destroy_mpm() {
+  detach();
   mpm_destroy(mpm_);
   mpm_ = NULL;
   if (halo_.content) halo_.destroy(halo_.content);
@@ -407,6 +409,7 @@ void FixMPMCouple::follow_walls() {
 
 /* Nothing here changes the way of points that have run before: a restart continues bit for bit. */
 void FixMPMCouple::setup(int) {
+  detach();
   start_points();
   gather();
   assign_rves();
@@ -421,14 +424,23 @@ void FixMPMCouple::setup(int) {
 /* Critical time steps, s, mechanical and thermal, of all points. Collective. */
 void FixMPMCouple::find_limits(double limit[2]) const {
   double mine[2];
-  mpm_critical_time_steps(mpm_, points_.data(), (int)points_.size(), &mine[0], &mine[1]);
+  if (attached_) mpm_critical_attached(mpm_, &mine[0], &mine[1]);
+  else mpm_critical_time_steps(mpm_, points_.data(), (int)points_.size(), &mine[0], &mine[1]);
   MPI_Allreduce(mine, limit, 2, MPI_DOUBLE, MPI_MIN, world);
   if (!scene_.mechanical) limit[0] = HUGE_VAL;
   if (!scene_.thermal) limit[1] = HUGE_VAL;
 }
 
+/* Without a look at each point. Collective. */
+bool FixMPMCouple::is_below_limits() const {
+  int mine = attached_ && mpm_is_below_critical(mpm_, update->dt), all;
+  MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_MIN, world);
+  return all;
+}
+
 void FixMPMCouple::check_time_step(bool starting) {
   if (!check_time_step_ || (!starting && warned_time_step_)) return;
+  if (!starting && is_below_limits()) return;
   double limit[2];
   find_limits(limit);
   const int every = heat_every_ > 1 ? heat_every_ : 1, worse = limit[1] / every < limit[0];

@@ -148,6 +148,11 @@ class FixMPMCouple : public Fix {
   int64_t last_number_ = 0; /* of all points so far */
   std::vector<MpmPoint> points_; /* this rank's points, gathered from the particles */
   std::vector<int> particle_;    /* their indices */
+  bool attached_ = false;        /* to the core, which borrows points_ */
+  int attached_particles_ = 0;   /* atom->nlocal when they were */
+  bool points_written_ = true, state_written_ = true; /* points_, state_ are as the core's; if attached */
+  std::vector<double> work_;     /* J, external, of points_; if attached */
+  std::vector<int> output_every_; /* steps in which other fixes may read the output */
   bigint points_before_exchange_ = -1;
   bool warned_time_step_ = false;
 
@@ -185,6 +190,7 @@ class FixMPMCouple : public Fix {
   void find_walls_and_tractions();
   void check_followed();
   void follow_walls();
+  bool is_below_limits() const;
   void check_time_step(bool starting);
   void find_limits(double limit[2]) const;
 
@@ -202,9 +208,17 @@ class FixMPMCouple : public Fix {
   void answer_points();
   void assign_rves();
   void gather();
-  void scatter();
+  MpmMotion motion();
+  bool has_other_particles() const;
+  BaseStatus attach();
+  void write_points();
+  void write_state();
+  void detach();
+  void give_motion();
+  void find_readers();
+  bool output_is_due() const;
   void fill_output();
-  void check_leaving(double **x) const;
+  void check_leaving(double **x, bool some) const;
   bigint count_points(bool inside_only) const;
   bool is_outside(const double position[3]) const;
 

@@ -22,12 +22,14 @@ void FixMPMCouple::grow_arrays(int rows) {
 }
 
 void FixMPMCouple::copy_arrays(int from, int to, int) {
+  detach();
   memcpy(state_[to], state_[from], STATE_COLUMNS * sizeof(double));
   memcpy(array_atom[to], array_atom[from], OUTPUT_COLUMNS * sizeof(double));
 }
 
 /* A new particle: STAGE_NEW is 0. Its radius is set here, before pair styles look for the largest. */
 void FixMPMCouple::set_arrays(int i) {
+  detach();
   memset(state_[i], 0, STATE_COLUMNS * sizeof(double));
   memset(array_atom[i], 0, OUTPUT_COLUMNS * sizeof(double));
   if (!(atom->mask[i] & groupbit)) return;
@@ -37,12 +39,14 @@ void FixMPMCouple::set_arrays(int i) {
 }
 
 int FixMPMCouple::pack_exchange(int i, double *buffer) {
+  detach();
   memcpy(buffer, state_[i], STATE_COLUMNS * sizeof(double));
   memcpy(buffer + STATE_COLUMNS, array_atom[i], OUTPUT_COLUMNS * sizeof(double));
   return STATE_COLUMNS + OUTPUT_COLUMNS;
 }
 
 int FixMPMCouple::unpack_exchange(int i, double *buffer) {
+  detach();
   memcpy(state_[i], buffer, STATE_COLUMNS * sizeof(double));
   memcpy(array_atom[i], buffer + STATE_COLUMNS, OUTPUT_COLUMNS * sizeof(double));
   return STATE_COLUMNS + OUTPUT_COLUMNS;
@@ -52,6 +56,7 @@ int FixMPMCouple::size_restart(int) { return STATE_COLUMNS + 1; }
 int FixMPMCouple::maxsize_restart() { return STATE_COLUMNS + 1; }
 
 int FixMPMCouple::pack_restart(int i, double *buffer) {
+  write_state();
   buffer[0] = STATE_COLUMNS + 1;
   memcpy(buffer + 1, state_[i], STATE_COLUMNS * sizeof(double));
   return STATE_COLUMNS + 1;
@@ -59,6 +64,7 @@ int FixMPMCouple::pack_restart(int i, double *buffer) {
 
 /* The nth fix's values follow those of the n fixes before it, each of which starts with its length. */
 void FixMPMCouple::unpack_restart(int i, int nth) {
+  detach();
   const double *extra = atom->extra[i];
   int start = 0;
   for (int k = 0; k < nth; k++) start += (int)extra[start];

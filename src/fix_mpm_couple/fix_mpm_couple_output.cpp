@@ -1,21 +1,72 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Global values for thermo_style, the progress line, the closing line. */
+/* Values of points and global ones for dumps and thermo_style, the progress line, the closing line. */
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <cstring>
 
 #include "../base/tensor.h"
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
 #include "double_sum.h"
+#include "fix_gravity.h"
 #include "fix_mpm_couple.h"
 #include "fix_mpm_rve.h"
+#include "modify.h"
+#include "output.h"
 #include "rank_error.h"
 #include "update.h"
 
 using namespace LAMMPS_NS;
+using namespace FixConst;
+
+/* ------------------------------------------------------------------------------------------- who reads f_ID[i], and when */
+
+/* Gravity may follow a variable, which may ask for anything. */
+struct GravityWords : public FixGravity {
+  static bool has_variable(const FixGravity *gravity) {
+    char *FixGravity::*const words[] = {&GravityWords::mstr, &GravityWords::vstr, &GravityWords::pstr, &GravityWords::tstr,
+                                        &GravityWords::xstr, &GravityWords::ystr, &GravityWords::zstr};
+    for (char *FixGravity::*word : words)
+      if (gravity->*word) return true;
+    return false;
+  }
+};
+
+/* Fixes that never look at values of other fixes, variables or computes. */
+static bool never_reads(const Fix *fix) {
+  if (const FixGravity *gravity = dynamic_cast<const FixGravity *>(fix)) return !GravityWords::has_variable(gravity);
+  for (const char *style : {"mpm/", "property/", "mesh/surface", "wall/gran", "nve", "contacthistory", "heat/gran",
+                            "heat/rest", "expansion/gran", "bond/gran/thermal"})
+    if (strncmp(fix->style, style, strlen(style)) == 0) return true;
+  return false;
+}
+
+/* Dumps and thermo output come at known steps, as do fixes that act at the end of every n-th step alone (ave/..., print);
+ * all other fixes might look at any time. */
+void FixMPMCouple::find_readers() {
+  output_every_.clear();
+  for (int k = 0; k < modify->nfix; k++) {
+    const Fix *fix = modify->fix[k];
+    if (!never_reads(fix)) output_every_.push_back(modify->fmask[k] == END_OF_STEP && fix->nevery > 0 ? fix->nevery : 1);
+  }
+}
+
+bool FixMPMCouple::output_is_due() const {
+  const bigint step = update->ntimestep;
+  for (int every : output_every_)
+    if (step % every == 0) return true;
+  return step == output->next || step == update->laststep;
+}
+
+void FixMPMCouple::fill_output() {
+  write_points();
+  for (size_t k = 0; k < points_.size(); k++) point_output(points_[k], scene_.dimension, array_atom[particle_[k]]);
+}
+
+/* ------------------------------------------------------------------------------------------------------- global values */
 
 /* This rank's part of the sums over points. */
 void FixMPMCouple::sum_points(DoubleSum sum[TOTALS]) const {
@@ -41,7 +92,9 @@ void FixMPMCouple::sum_points(DoubleSum sum[TOTALS]) const {
 /* Collective, as thermo output is. */
 void FixMPMCouple::update_totals() {
   if (totals_step_ == update->ntimestep) return;
-  gather();
+  if (has_other_particles()) detach();
+  write_state();
+  gather(); /* with the present forces; attached points stay where they are in points_ */
   DoubleSum mine[TOTALS];
   sum_points(mine);
   std::vector<DoubleSum> parts((size_t)TOTALS * comm->nprocs);
@@ -115,6 +168,7 @@ void FixMPMCouple::progress() {
 }
 
 void FixMPMCouple::post_run() {
+  detach();
   if (progress_shown_) fprintf(screen, "\r\033[K");
   std::string line = heat_line() + rve_lines();
   if (comm->me != 0) return;

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* One step: particles to points, the MPM step, points to particles; and what keeps points from getting lost. */
+/* One step: particles to points, the MPM step, points to particles; and what keeps points from getting lost.
+ *
+ * While the points are attached to the core it alone has their state: points_ and state_ are behind it until write_points()
+ * and write_state(). LIGGGHTS' own arrays have positions and velocities after each step, and whoever changes them, or the
+ * forces, is heard in the next. What moves rows of state_ or adds some detaches first. */
 #include <algorithm>
 #include <cstring>
 
@@ -159,40 +163,91 @@ void FixMPMCouple::gather() {
   }
 }
 
-void FixMPMCouple::scatter() {
-  for (size_t n = 0; n < points_.size(); n++) {
-    const MpmPoint &point = points_[n];
-    const int i = particle_[n];
-    memcpy(state_[i], &point, sizeof point);
-    for (int k = 0; k < scene_.dimension; k++) {
-      state_[i][STATE_EXTERNAL_WORK] += point.force[k] * (point.position[k] - atom->x[i][k]);
-      atom->x[i][k] = point.position[k];
-      atom->v[i][k] = point.velocity[k];
-    }
-    /* At once, not when LIGGGHTS happens to reneighbour: the way must not depend on that. */
-    domain->remap(atom->x[i], atom->image[i]);
+/* LIGGGHTS' arrays, whose rows follow each other in memory. */
+MpmMotion FixMPMCouple::motion() {
+  MpmMotion motion = {};
+  if (points_.empty()) return motion;
+  motion.index = particle_.data();
+  motion.position = (double(*)[3])atom->x[0];
+  motion.velocity = (double(*)[3])atom->v[0];
+  motion.force = (const double(*)[3])atom->f[0];
+  motion.work = work_.data();
+  return motion;
+}
+
+/* Some were deleted without a word to this fix. */
+bool FixMPMCouple::has_other_particles() const { return attached_ && atom->nlocal != attached_particles_; }
+
+/* The points stay in the core until LIGGGHTS does more to them than to change their motion (detach). */
+BaseStatus FixMPMCouple::attach() {
+  if (attached_ && !has_other_particles()) {
+    const MpmMotion present = motion();
+    mpm_take_motion(mpm_, &present);
+    return BASE_OK;
   }
+  detach();
+  gather();
+  work_.resize(points_.size());
+  for (size_t n = 0; n < points_.size(); n++) work_[n] = state_[particle_[n]][STATE_EXTERNAL_WORK];
+  TRY(mpm_attach(mpm_, points_.data(), (int)points_.size()));
+  attached_ = true;
+  attached_particles_ = atom->nlocal;
+  return BASE_OK;
+}
+
+/* points_ as they are now. */
+void FixMPMCouple::write_points() {
+  if (!attached_ || points_written_) return;
+  mpm_write(mpm_);
+  points_written_ = true;
+}
+
+/* state_ as it is now. */
+void FixMPMCouple::write_state() {
+  if (!attached_ || state_written_) return;
+  write_points();
+  for (size_t n = 0; n < points_.size(); n++) {
+    double *state = state_[particle_[n]];
+    memcpy(state, &points_[n], sizeof points_[n]);
+    state[STATE_EXTERNAL_WORK] = work_[n];
+  }
+  state_written_ = true;
+}
+
+void FixMPMCouple::detach() {
+  write_state();
+  attached_ = false;
+}
+
+/* What others see between steps. At once remapped, not when LIGGGHTS happens to reneighbour: the way must not depend on
+ * that. */
+void FixMPMCouple::give_motion() {
+  double low[3], high[3];
+  const MpmMotion present = motion();
+  mpm_give_motion(mpm_, &present, low, high);
+  points_written_ = state_written_ = false;
+  bool leaves = false;
+  for (int k = 0; k < scene_.dimension; k++) leaves = leaves || low[k] < domain->boxlo[k] || high[k] >= domain->boxhi[k];
+  for (size_t n = 0; leaves && n < points_.size(); n++) domain->remap(atom->x[particle_[n]], atom->image[particle_[n]]);
+  check_leaving(atom->x, leaves);
 }
 
 void FixMPMCouple::final_integrate() {
-  gather();
   for (size_t k = 0; k < walls_.size(); k++) walls_[k] = wall_fixes_[k]->present(update->dt);
   follow_walls();
+  if (!followed_.empty()) detach(); /* the domains of points over the grid's spacing are found when they are attached */
+  BaseStatus status = attach();
   begin_heat();
-  fix_check(lmp, this, mpm_step(mpm_, points_.data(), (int)points_.size(), update->dt));
-  scatter();
+  if (status == BASE_OK) status = mpm_advance(mpm_, update->dt);
+  fix_check(lmp, this, status);
+  give_motion();
   for (size_t k = 0; k < walls_.size(); k++) wall_fixes_[k]->end_step(walls_[k], update->dt);
-  check_leaving(atom->x);
   check_time_step(false);
-  fill_output();
+  if (output_is_due()) fill_output();
   progress();
   /* Points have moved after LIGGGHTS fitted a shrink-wrapped box around them: a restart file needs a box that holds
    * them. */
   if (domain->nonperiodic == 2 && output->restart_requested(update->ntimestep)) domain->reset_box();
-}
-
-void FixMPMCouple::fill_output() {
-  for (size_t k = 0; k < points_.size(); k++) point_output(points_[k], scene_.dimension, array_atom[particle_[k]]);
 }
 
 /* ---------------------------------------------------------------------------------------------------- nothing lost */
@@ -206,10 +261,11 @@ bool FixMPMCouple::is_outside(const double position[3]) const {
   return false;
 }
 
-void FixMPMCouple::check_leaving(double **x) const {
+void FixMPMCouple::check_leaving(double **x, bool some) const {
   if (delete_leaving_) return;
   BaseStatus status = BASE_OK;
-  for (int i : particle_)
+  for (size_t n = 0; some && n < particle_.size(); n++) {
+    const int i = particle_[n];
     if (status == BASE_OK && is_outside(x[i]))
       status = base_error(BASE_ERROR_UNSTABLE,
                           "the material point with particle id %d left the box at step %lld through a fixed boundary, "
@@ -217,6 +273,7 @@ void FixMPMCouple::check_leaving(double **x) const {
                           "a fix mpm/wall, make the box "
                           "larger, or let points go by 'leaving delete'",
                           atom->tag[i], (long long)update->ntimestep, x[i][0], x[i][1], x[i][2]);
+  }
   fix_check(lmp, this, status);
 }
 
@@ -240,6 +297,11 @@ void FixMPMCouple::pre_neighbor() {
                            "last reneighbouring; use 'neigh_modify every 1 delay 0 check yes' or a smaller timestep",
                            (long long)(expected - now)));
   if (update->setupflag || !mpm_) return;
+  const int mine = !attached_;
+  int any;
+  MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
+  if (!any) return; /* nobody came, went or changed places */
+  detach();
   start_points();
   gather();
   answer_points();

@@ -176,6 +176,20 @@ BaseStatus mpm_step(Mpm *mpm, MpmPoint *points, int count, double dt);
 BaseStatus mpm_attach(Mpm *mpm, MpmPoint *points, int count);
 BaseStatus mpm_advance(Mpm *mpm, double dt);
 void mpm_write(const Mpm *mpm);
+
+/* Motion of attached points in arrays of the caller (LIGGGHTS' own), of which others may read and write. */
+typedef struct MpmMotion {
+  const int *index;         /* [count] row of the following arrays, for each point of the attached array */
+  double (*position)[3];    /* m */
+  double (*velocity)[3];    /* m/s */
+  const double (*force)[3]; /* N, external */
+  double *work;             /* [count] J, of the external force on each point so far */
+} MpmMotion;
+/* Between attach and the next step, or between steps: takes over the motion where its bits differ from the core's. */
+void mpm_take_motion(Mpm *mpm, const MpmMotion *motion);
+/* After a step: writes positions and velocities (2D: x and y) and adds force times displacement from the position that stood
+ * there to work. low, high: box around all positions, m; low > high without points. */
+void mpm_give_motion(Mpm *mpm, const MpmMotion *motion, double low[3], double high[3]);
 /* Answers of the law for the initial state (stress of the packing, conductivity, modulus), without stepping. Sets
  * temperature_mapped and temperature_law to temperature: call it once for new points, not for restarted ones.
  * Collective. */
@@ -185,6 +199,12 @@ BaseStatus mpm_initialise(Mpm *mpm, MpmPoint *points, int count);
  * the limit of verification B9 (0.5 for FLIP, PIC, XPIC with USF or MUSL, 0.45 if linear; less for APIC and USL:
  * mpm_critical.c). Thermal: rho c h^2 / (b k_max), b = 2, 10 if linear (eq. 30-31 corrected). */
 void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, double *mechanical, double *thermal);
+/* The same of the attached points as they are now. */
+void mpm_critical_attached(Mpm *mpm, double *mechanical, double *thermal);
+/* 1 if dt is surely below the mechanical limit of the attached points, without a look at each: since the last
+ * mpm_critical_attached() their speeds of sound grew by at most 1 % per step (a law of constant moduli, which only their volumes
+ * change), their largest speed is known from mpm_give_motion(). 0: unknown. */
+int mpm_is_below_critical(const Mpm *mpm, double dt);
 
 /* Sums over this rank's own points (caller reduces over ranks). */
 typedef struct MpmTotals {

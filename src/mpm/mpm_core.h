@@ -78,6 +78,9 @@ typedef struct MpmPoints {
   int load_room;
   MpmVec *gathered;    /* XPIC: {1, intermediate velocity} */
   double *carry;       /* slot: scratch for halo->forward */
+  double fastest;      /* m/s, of own points at the last mpm_give_motion(); INFINITY: they moved since */
+  double sound;        /* m/s, the largest speed of sound at the last mpm_critical_attached(); INFINITY: none yet */
+  int sound_age;       /* steps since */
   unsigned char *moves; /* own rows: leaves its cell */
   int movers_known;     /* `moves` is up to date: G2P has found who leaves */
   int *mover;           /* rows that leave */
@@ -226,6 +229,9 @@ static inline int mpm_law_is_local(const Mpm *mpm) {
 }
 static inline int mpm_is_parallel(const Mpm *mpm) {
   return mpm->threads > 1 && mpm->points.count > MPM_PARALLEL_POINTS;
+}
+MPM_INLINE MpmVec mpm_vector_of(int dimension, double first, const double x[3]) {
+  return (MpmVec){first, x[0], x[1], dimension == 3 ? x[2] : 0.0};
 }
 /* Loops over a tensor's components that take part: 9, or the 4 of the plane. */
 static inline int mpm_component(int dimension, int n) { return dimension == 3 ? n : n + n / 2; }

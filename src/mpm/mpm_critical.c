@@ -30,11 +30,23 @@ static double largest_eigenvalue(const double a[6]) {
   return mean + 2.0 * size * cos(acos(cosine) / 3.0);
 }
 
+/* Limit times (c + |v|), m. */
+static double mechanical_reach(const Mpm *mpm) {
+  const int is_usl = mpm->scene.order == MPM_ORDER_USL, is_apic = mpm->scene.transfer == MPM_TRANSFER_APIC;
+  return SAFETY * LIMIT[is_usl][is_apic][mpm->scene.shape] * mpm_smallest_spacing(mpm);
+}
+
+static double sound_speed(double modulus, double volume, double mass) { return sqrt(fmax(modulus, 0.0) * volume / mass); }
+
+static double thermal_limit(const Mpm *mpm, const MpmPoint *point, double volume) {
+  const double conductivity = largest_eigenvalue(point->conductivity), smallest = mpm_smallest_spacing(mpm);
+  const double capacity = point->mass * point->heat_capacity / volume;
+  return conductivity > 0.0 ? capacity * smallest * smallest / (THERMAL_B[mpm->scene.shape] * conductivity) : INFINITY;
+}
+
 void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, double *mechanical, double *thermal) {
   const MpmScene *scene = &mpm->scene;
-  const int is_usl = scene->order == MPM_ORDER_USL, is_apic = scene->transfer == MPM_TRANSFER_APIC;
-  const double factor = SAFETY * LIMIT[is_usl][is_apic][scene->shape];
-  const double smallest = mpm_smallest_spacing(mpm);
+  const double reach = mechanical_reach(mpm);
   *mechanical = *thermal = INFINITY;
   for (int p = 0; p < count; p++) {
     const MpmPoint *point = &points[p];
@@ -42,15 +54,46 @@ void mpm_critical_time_steps(const Mpm *mpm, const MpmPoint *points, int count, 
     if (scene->mechanical) {
       double square = 0.0;
       for (int i = 0; i < scene->dimension; i++) square += point->velocity[i] * point->velocity[i];
-      const double speed = sqrt(fmax(point->modulus, 0.0) * volume / point->mass) + sqrt(square);
-      if (speed > 0.0) *mechanical = fmin(*mechanical, factor * smallest / speed);
+      const double speed = sound_speed(point->modulus, volume, point->mass) + sqrt(square);
+      if (speed > 0.0) *mechanical = fmin(*mechanical, reach / speed);
     }
-    if (scene->thermal) {
-      const double conductivity = largest_eigenvalue(point->conductivity);
-      const double capacity = point->mass * point->heat_capacity / volume;
-      if (conductivity > 0.0)
-        *thermal =
-            fmin(*thermal, capacity * smallest * smallest / (THERMAL_B[scene->shape] * conductivity));
-    }
+    if (scene->thermal) *thermal = fmin(*thermal, thermal_limit(mpm, point, volume));
   }
+}
+
+/* Only laws that act on rows have their moduli there. */
+static double row_modulus(const Mpm *mpm, int k) {
+  const MpmPoints *p = &mpm->points;
+  if (!mpm_law_is_local(mpm)) return p->home[p->slot[k]].modulus;
+  double stress[6], modulus, scalars[MPM_LAW_SCALARS];
+  for (int n = 0; n < 6; n++) stress[n] = p->stress[n][k];
+  mpm->law->describe(mpm->law->content, stress, &modulus, scalars);
+  return modulus;
+}
+
+void mpm_critical_attached(Mpm *mpm, double *mechanical, double *thermal) {
+  MpmPoints *p = &mpm->points;
+  const double reach = mechanical_reach(mpm);
+  double fastest = 0.0, least = INFINITY, sound = 0.0;
+#pragma omp parallel for num_threads(mpm->threads) if (mpm_is_parallel(mpm)) reduction(max : fastest, sound) \
+    reduction(min : least)
+  for (int k = 0; k < p->live; k++) {
+    const double volume = mpm_row_volume(mpm, k);
+    if (mpm->scene.mechanical) {
+      const MpmVec v = p->motion[k];
+      const double c = sound_speed(row_modulus(mpm, k), volume, p->position[k][0]);
+      sound = fmax(sound, c);
+      fastest = fmax(fastest, c + sqrt(v[1] * v[1] + v[2] * v[2] + v[3] * v[3]));
+    }
+    if (mpm->scene.thermal) least = fmin(least, thermal_limit(mpm, &p->home[p->slot[k]], volume));
+  }
+  *mechanical = fastest > 0.0 ? reach / fastest : INFINITY;
+  *thermal = least;
+  p->sound = sound, p->sound_age = 0;
+}
+
+int mpm_is_below_critical(const Mpm *mpm, double dt) {
+  const MpmPoints *p = &mpm->points;
+  if (!mpm_law_is_local(mpm) || !mpm->scene.mechanical) return 0;
+  return dt * (p->sound * pow(1.01, p->sound_age) + p->fastest) < mechanical_reach(mpm);
 }

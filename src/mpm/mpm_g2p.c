@@ -19,23 +19,39 @@ static int chunk_end(const Mpm *mpm, int chunk) {
 
 /* --------------------------------------------------------------------------------------------------- gradients */
 
+MPM_INLINE void velocity_gradient_row(Mpm *mpm, int k, const int *row, const MpmWeights *w, int dimension, int width) {
+  double *const *result = mpm->points.velocity_gradient;
+  if (dimension == 2) {
+    const MpmVec per_length = __builtin_shufflevector(mpm->per_length, mpm->per_length, 1, 1, 2, 2);
+    const MpmVec rate = per_length * mpm_gather_plane(mpm->grid.state, row, w, width);
+    result[0][k] = rate[0], result[1][k] = rate[2], result[3][k] = rate[1], result[4][k] = rate[3];
+    return;
+  }
+  MpmVec gradient[3];
+  mpm_gather_gradient(mpm->grid.state, row, w, w->slope, dimension, width, gradient);
+  for (int j = 0; j < 3; j++) {
+    gradient[j] *= mpm->per_length[1 + j];
+    for (int i = 0; i < 3; i++) result[3 * i + j][k] = gradient[j][1 + i];
+  }
+}
+
+MPM_INLINE void temperature_gradient_row(Mpm *mpm, int k, const int *row, const MpmWeights *w, int dimension, int width) {
+  double *result = mpm->points.home[mpm->points.slot[k]].temperature_gradient;
+  MpmVec gradient[3];
+  mpm_gather_gradient(mpm->grid.state, row, w, w->slope, dimension, width, gradient);
+  for (int j = 0; j < 3; j++) result[j] = j < dimension ? mpm->per_length[1 + j] * gradient[j][0] : 0.0;
+}
+
 MPM_INLINE void gradient_body(Mpm *mpm, int first, int end, int of_temperature, int dimension, MpmShape shape) {
-  MpmPoints *p = &mpm->points;
   const MpmGrid *grid = &mpm->grid;
+  const int width = mpm_shape_width(shape);
   for (int cell = first; cell < end; cell++) {
     const MpmCellBase base = mpm_cell_base(mpm, cell, dimension);
     for (int k = grid->cell_first[cell]; k < grid->cell_first[cell + 1]; k++) {
       MpmWeights w;
-      MpmVec gradient[3];
       mpm_find_weights(mpm, k, &base, shape, &w);
-      mpm_gather_gradient(grid->state, grid->cell_row[cell], &w, w.slope, dimension, mpm_shape_width(shape), gradient);
-      for (int j = 0; j < dimension; j++) {
-        gradient[j] *= mpm->per_length[1 + j];
-        if (of_temperature) p->home[p->slot[k]].temperature_gradient[j] = gradient[j][0];
-        else
-          for (int i = 0; i < dimension; i++) p->velocity_gradient[3 * i + j][k] = gradient[j][1 + i];
-      }
-      if (of_temperature && dimension == 2) p->home[p->slot[k]].temperature_gradient[2] = 0.0;
+      if (of_temperature) temperature_gradient_row(mpm, k, grid->cell_row[cell], &w, dimension, width);
+      else velocity_gradient_row(mpm, k, grid->cell_row[cell], &w, dimension, width);
     }
   }
 }

@@ -186,17 +186,13 @@ MpmVec mpm_half_edges(const Mpm *mpm, const double size0[3], const double f[9]) 
 
 /* ----------------------------------------------------------------------------------------------------- filling */
 
-MPM_INLINE MpmVec vector_of(int dimension, double first, const double x[3]) {
-  return (MpmVec){first, x[0], x[1], dimension == 3 ? x[2] : 0.0};
-}
-
 /* What P2G and G2P need, own or foreign. */
 static void load_common(Mpm *mpm, int k, const MpmPoint *point) {
   MpmPoints *p = &mpm->points;
   const int dimension = mpm->scene.dimension;
   p->tag[k] = point->tag;
-  p->position[k] = vector_of(dimension, point->mass, point->position);
-  p->motion[k] = vector_of(dimension, 1.0, point->velocity);
+  p->position[k] = mpm_vector_of(dimension, point->mass, point->position);
+  p->motion[k] = mpm_vector_of(dimension, 1.0, point->velocity);
   if (p->half) p->half[k] = mpm_half_edges(mpm, point->size0, point->deformation_gradient);
   if (p->affine) memcpy(p->affine[k], point->affine, sizeof point->affine);
 }
@@ -205,7 +201,7 @@ static void load_own(Mpm *mpm, int k, const MpmPoint *point) {
   MpmPoints *p = &mpm->points;
   const int dimension = mpm->scene.dimension;
   load_common(mpm, k, point);
-  p->force[k] = vector_of(dimension, 0.0, point->force);
+  p->force[k] = mpm_vector_of(dimension, 0.0, point->force);
   p->volume0[k] = dimension == 3 ? point->volume0 : point->volume0 * point->deformation_gradient[8];
   for (int n = 0; n < dimension * dimension; n++) {
     const int c = mpm_component(dimension, n);
@@ -238,7 +234,7 @@ static void find_order(Mpm *mpm, const MpmPoint *points, int count) {
     const MpmPoint *point = &points[s];
     const MpmVec half = mpm->scene.shape == MPM_SHAPE_GIMP
                             ? mpm_half_edges(mpm, point->size0, point->deformation_gradient) : mpm_vec_all(0.5);
-    const MpmVec position = vector_of(mpm->scene.dimension, 0.0, point->position);
+    const MpmVec position = mpm_vector_of(mpm->scene.dimension, 0.0, point->position);
     p->item[s] = (MpmItem){mpm_find_cell(mpm, position, half, point->tag), point->tag, s};
   }
   mpm_sort_items(&p->item, &p->spare_item, count);
@@ -262,6 +258,7 @@ BaseStatus mpm_points_attach(Mpm *mpm, MpmPoint *points, int count) {
   p->own = p->live = p->count = count;
   p->foreign = 0;
   p->has_stepped = 0;
+  p->fastest = p->sound = INFINITY;
 #pragma omp parallel for num_threads(mpm->threads) if (count > MPM_PARALLEL_POINTS)
   for (int s = 0; s < count; s++) {
     BaseStatus status;
@@ -297,7 +294,7 @@ void mpm_points_load_foreign(Mpm *mpm, const MpmPoint *foreign) {
     const char *fault = mpm_find_fault(mpm, point, &status);
     if (fault) mpm_note_point(mpm, status, point->tag, fault);
     const MpmVec half = p->half ? mpm_half_edges(mpm, point->size0, point->deformation_gradient) : mpm_vec_all(0.5);
-    const MpmVec position = vector_of(mpm->scene.dimension, 0.0, point->position);
+    const MpmVec position = mpm_vector_of(mpm->scene.dimension, 0.0, point->position);
     p->item[s] = (MpmItem){fault ? 0 : mpm_find_cell(mpm, position, half, point->tag), point->tag, s};
   }
   mpm_sort_items(&p->item, &p->spare_item, p->foreign);
@@ -308,7 +305,7 @@ void mpm_points_load_foreign(Mpm *mpm, const MpmPoint *foreign) {
     p->key[k] = p->item[s].cell;
     load_common(mpm, k, point);
     p->equal_domains = p->equal_domains && is_equal(p->half[k], p->half[0]);
-    p->force[k] = vector_of(3, 0.0, none);
+    p->force[k] = mpm_vector_of(3, 0.0, none);
     if (p->old_position) p->old_position[k] = p->position[k]; /* nobody here moves them */
     p->mass_low = fmin(p->mass_low, point->mass), p->mass_high = fmax(p->mass_high, point->mass);
   }

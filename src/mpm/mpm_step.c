@@ -343,6 +343,8 @@ static BaseStatus step_rows(Mpm *mpm, double dt) {
   TRY(start_grid(mpm));
   TRY(mpm->scene.order == MPM_ORDER_USF ? step_law_first(mpm) : step_law_last(mpm));
   mpm->points.has_stepped = 1;
+  mpm->points.fastest = INFINITY;
+  mpm->points.sound_age++;
   return report(mpm);
 }
 
