@@ -272,10 +272,24 @@ void FixHeatGranGrain::exchange(int i, int j, double *record) {
   }
 }
 
-double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
+/* Nothing if they are too far apart to be neighbours. */
+GrainView FixHeatGranGrain::view_of(const GrainPair &pair) const {
   const double sum = pair.radius[0] + pair.radius[1];
-  if (pair.distance - sum >= 0.5 * model_.reach * sum) return 0.0;
-  const GrainView view = grain_view(&pair, grain_face_radius(&pair, model_.porosity), surface_.emissivity);
+  if (pair.distance - sum >= 0.5 * model_.reach * sum) return {};
+  return grain_view(&pair, grain_face_radius(&pair, model_.porosity), surface_.emissivity);
+}
+
+GrainView FixHeatGranGrain::view_of_wall(const WallContact &contact) const {
+  const int i = contact.grain;
+  const double radius = atom->radius[i];
+  const double distance = find_real_distance(contact.distance, radius, atom->type[i], contact.type);
+  if (!contact.in_sight || distance - radius >= 0.5 * model_.reach * radius) return {};
+  const GrainPair mirror = {{radius, radius}, {}, 2.0 * distance};
+  return grain_view_wall(radius, distance, grain_face_radius(&mirror, model_.porosity), surface_.emissivity);
+}
+
+double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
+  const GrainView view = view_of(pair);
   hidden_[i] += view.share[0];
   if (j < atom->nlocal) hidden_[j] += view.share[1];
   const double temperature[2] = {Temp[i], Temp[j]};
@@ -283,15 +297,9 @@ double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
 }
 
 double FixHeatGranGrain::radiate_to_wall(const WallContact &contact) {
-  const int i = contact.grain;
-  const double radius = atom->radius[i];
-  const double distance = find_real_distance(contact.distance, radius, atom->type[i], contact.type);
-  if (!contact.in_sight || distance - radius >= 0.5 * model_.reach * radius) return 0.0;
-  const GrainPair mirror = {{radius, radius}, {}, 2.0 * distance};
-  const double face = grain_face_radius(&mirror, model_.porosity);
-  const GrainView view = grain_view_wall(radius, distance, face, surface_.emissivity);
-  hidden_[i] += view.share[0];
-  const double temperature[2] = {Temp[i], contact.temperature};
+  const GrainView view = view_of_wall(contact);
+  hidden_[contact.grain] += view.share[0];
+  const double temperature[2] = {Temp[contact.grain], contact.temperature};
   return grain_radiation_between(view.area, temperature, surface_.absolute_zero);
 }
 

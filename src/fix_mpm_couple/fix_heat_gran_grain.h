@@ -106,6 +106,8 @@ class FixHeatGranGrain : public FixHeatGran {
   void slip(int i, int j, double *history);
   void find_walls();
   double find_wall_conductance(const WallContact &contact) const;
+  GrainView view_of(const GrainPair &pair) const;
+  GrainView view_of_wall(const WallContact &contact) const;
   double radiate(int i, int j, const GrainPair &pair);
   double radiate_to_wall(const WallContact &contact);
   void keep_positions();
