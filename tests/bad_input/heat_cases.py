@@ -1,20 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Wrong scripts for fix heat/gran/grain; see cases.py."""
-from cases import Case
+from cases import TWO_GRAINS, Case
 
-HEAT_BASE = """\
-atom_style      granular
-atom_modify     map array
-units           si
-newton          off
-communicate     single vel yes
-boundary        f f f
-region          box block 0 0.04 0 0.02 0 0.02 units box
-create_box      1 box
-create_atoms    1 single 0.01 0.01 0.01 units box
-create_atoms    1 single 0.0195 0.01 0.01 units box
-set             group all diameter 0.01 density 2500
-neighbor        0.003 bin
+HEAT_BASE = TWO_GRAINS + """\
 fix m1 all property/global youngsModulus peratomtype 5e6
 fix m2 all property/global poissonsRatio peratomtype 0.3
 fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5
