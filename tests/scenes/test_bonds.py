@@ -228,21 +228,22 @@ def test_grains_that_grow_into_each_other_are_found(dempm, np):
     assert end["fx"] == pytest.approx([-PLAIN["kn"] * overlap, PLAIN["kn"] * overlap], rel=1e-9)
 
 
-def test_bond_that_ends_by_shear_leaves_a_contact_that_slips_and_heats(dempm):
+@pytest.mark.parametrize("np", [1, 2])
+def test_bond_that_ends_by_shear_leaves_a_contact_that_slips_and_heats(dempm, np):
     """Two free grains, pressed together and sheared: the bond ends, its spring becomes that of the contact, which slides
-    until they part. Motion, heat of friction and the springs at the start add up."""
+    until they part. Motion, heat of friction and the springs at the start add up. The boundary of two ranks is between them."""
     overlap, capacity = 5e-5, 500.0
-    script = row([(0.0, 0.0, 0.0), (2 * R - overlap, 0.0, 0.0)], ROW_BOX, dict(dt=1e-7, expansion=0.0, strength=4e-3, mu=0.05),
-                 FIXES.replace("direct pipe", "direct pipe friction yes"))
-    script += "group two id 2\nvelocity two set 0 0.4 0 units box\nfix move all nve/sphere\n"
+    script = row([(0.0, 0.0, 0.0), (2 * R - overlap, 0.0, 0.0)], "-0.04 0.05 -0.01 0.01 -0.01 0.01",
+                 dict(dt=1e-7, expansion=0.0, strength=4e-3, mu=0.05), FIXES.replace("direct pipe", "direct pipe friction yes"))
+    script += "group two id 2\nvelocity two set 0 0.24 0.32 units box\nfix move all nve/sphere\n"
     script += THERMO.replace("ke", "ke f_heat f_heat[4]") + FRAME.replace("omegaz", "omegaz mass").replace("run 0", "").replace(
         '%.17g"', '%.17g %.17g"').replace("custom 1 ", "custom 10000 ") + "thermo 1\nrun 10000\n"
-    run = dempm(script)
+    run = dempm(script, np=np)
     assert run.table["f_bond[4]"][-1] == 1.0
     frames = [frame for _, frame in run.dump("end.dump")]
-    motion_energy = [sum(0.5 * m * (frame["vx"][i] ** 2 + frame["vy"][i] ** 2 + 0.4 * (R * frame["omegaz"][i]) ** 2)
+    motion_energy = [sum(0.5 * m * sum(frame[f"v{a}"][i] ** 2 + 0.4 * (R * frame[f"omega{a}"][i]) ** 2 for a in AXES)
                          for i, m in enumerate(frame["mass"])) for frame in (frames[0], frames[-1])]
-    assert math.dist(*((frames[-1]["x"][i], frames[-1]["y"][i]) for i in (0, 1))) > 2 * R
+    assert math.dist(*([frames[-1][a][i] for a in AXES] for i in (0, 1))) > 2 * R
     heat = sum(run.table["f_heat[4]"][1:]) * 1e-7
     assert heat > 0.05 * motion_energy[0]
     assert motion_energy[1] + heat + run.table["f_bond[7]"][-1] == pytest.approx(
