@@ -39,13 +39,14 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
       radiation_(false),
       neighbours_(false),
       friction_(false),
-      damping_(false),
       correction_(false),
+      damping_(NO_DAMPING),
       conductivity_table_(false),
       capacity_table_(false),
       walls_(lammps),
       walls_found_(false),
       law_(HOOKE_STIFFNESS),
+      bonds_(NULL),
       reach_(0.0) {
   vector_flag = 1;
   size_vector = FLOWS;
@@ -85,7 +86,7 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("conductivity")) conductivity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("capacity")) capacity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("friction")) friction_ = parser.yes_no();
-    else if (parser.is("damping")) damping_ = parser.yes_no();
+    else if (parser.is("damping")) damping_ = (Damping)parser.choice({"no", "yes", "normal"});
   }
 }
 
@@ -114,7 +115,7 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
   if (parser.given("area_correction") && !conducts)
     parser.fail("keyword 'area_correction' has a meaning with a direct or an indirect model only");
-  if (damping_ && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
+  if (counts_damping() && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
 }
 
 int FixHeatGranGrain::setmask() {

@@ -90,7 +90,7 @@ HEAT_CASES = [
           "fix floor all wall/gran model hooke/stiffness tangential no_history primitive type 1 zplane 0.0\nrun 2"),
          "'friction'", "fix floor", "tangential history"),
     heat("damping_without_friction", "reach 0.5", "reach 0.5 damping yes", "'damping'", "'friction yes'"),
-    heat("damping_maybe", "reach 0.5", "reach 0.5 friction yes damping 0.5", "'damping'", "'0.5'", "no or yes"),
+    heat("damping_maybe", "reach 0.5", "reach 0.5 friction yes damping 0.5", "'damping'", "'0.5'", "no, yes or normal"),
     heat("neighbours_skin", ("direct pipe area hertz", VORONOI, "neighbor        0.003"),
          ("direct none", "radiation 0.8 300 neighbours reach 0.7", "neighbor        0.0034"), "skin", "0.0034",
          "> 0.0035"),
