@@ -23,8 +23,9 @@ PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peer
          compare FORCE
 
 # ---------------------------------------------------------------------------------------------------------------- flags
-# psabi: vector types are passed between static functions only. maybe-uninitialized: gcc cannot know that an error status
-# is never BASE_OK and raises false alarms behind TRY(); the sanitizers find real ones.
+# psabi: gcc warns of the first vector in a file only; tests/test_vector_abi.py looks at all of them.
+# maybe-uninitialized: gcc cannot know that an error status is never BASE_OK and raises false alarms behind TRY(); the
+# sanitizers find real ones.
 WARN = -Wall -Wextra -Wpedantic -Wshadow -Wvla -Wno-psabi -Wno-maybe-uninitialized $(WERROR)
 # No errno and no traps from arithmetic, no contraction: vector and scalar loops then give the same bits.
 NUMERIC = -fno-math-errno -fno-trapping-math -ffp-contract=off

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Batches of RVEs: creation, stepping over threads or on the device, restart, views. */
+/* Batches of RVEs: creation, stepping over threads or on the device. */
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -156,21 +156,20 @@ static BaseStatus choose_backend(RveBatch *batch, RveBackend backend) {
   return BASE_ALLOC((size_t)batch->count, &batch->job);
 }
 
-static BaseStatus upload(RveBatch *batch, int k) {
+BaseStatus rve_batch_upload(RveBatch *batch, int k) {
   const RveRecord *record = &batch->record[k];
   return batch->device ? rve_device_upload(batch->device, k, &record->counts, record->bytes, record->arena) : BASE_OK;
 }
-static BaseStatus download(const RveBatch *batch, int k) {
+BaseStatus rve_batch_download(const RveBatch *batch, int k) {
   return batch->device ? rve_device_download(batch->device, k, batch->record[k].arena) : BASE_OK;
 }
 
 static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration);
 
-/* Lists, forces and answers of RVEs index[0..n), after a change from outside. */
-static BaseStatus refresh(RveBatch *batch, int n, const int *index) {
+BaseStatus rve_batch_refresh(RveBatch *batch, int n, const int *index) {
   BaseStatus first = BASE_OK;
   if (batch->device) {
-    for (int k = 0; k < n; k++) TRY(upload(batch, index ? index[k] : k));
+    for (int k = 0; k < n; k++) TRY(rve_batch_upload(batch, index ? index[k] : k));
     return device_step(batch, n, index, NULL, 0.0);
   }
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
@@ -218,7 +217,7 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
     rve_conduction_forget(&to->conduction);
     rve_layout(&to->counts, to->arena, &to->arrays);
   }
-  TRY_GOTO(refresh(batch, count, NULL), status, failed);
+  TRY_GOTO(rve_batch_refresh(batch, count, NULL), status, failed);
   for (int k = 0; k < count; k++)
     if (rve_head(batch->record[k].arena)->failed) {
       const RveCall still = {.steps = 0};
@@ -260,7 +259,7 @@ const RveScene *rve_batch_scene(const RveBatch *batch) { return &batch->scene; }
 
 /* ------------------------------------------------------------------------------------------------------- stepping */
 
-static BaseStatus check_index(const RveBatch *batch, int n, const int *index) {
+BaseStatus rve_batch_check_index(const RveBatch *batch, int n, const int *index) {
   if (n < 0 || (!index && n > batch->count) || (index && n > batch->count))
     return base_error(BASE_ERROR_ARGUMENT, "%d RVEs (allowed: 0 to %d)", n, batch->count);
   for (int k = 0; index && k < n; k++)
@@ -285,7 +284,7 @@ static BaseStatus check_input(const RveBatch *batch, int n, const RveInput *inpu
 static BaseStatus device_conduction(RveBatch *batch, int rve, const RveInput *input, double duration) {
   RveRecord *record = &batch->record[rve];
   if (record->last.status != BASE_OK) return BASE_OK;
-  if (rve_conduction_is_own(&batch->scene)) TRY(download(batch, rve));
+  if (rve_conduction_is_own(&batch->scene)) TRY(rve_batch_download(batch, rve));
   return answer_conduction(batch, record, input, duration, &batch->workspace[0]);
 }
 
@@ -315,9 +314,9 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
       RveDeviceJob *job = &batch->job[k];
       RveRecord *record = &batch->record[job->rve];
       if (job->outcome == RVE_TOO_SMALL) {
-        TRY(download(batch, job->rve));
+        TRY(rve_batch_download(batch, job->rve));
         TRY(rve_record_grow(record));
-        TRY(upload(batch, job->rve));
+        TRY(rve_batch_upload(batch, job->rve));
         job->pairs = pairs_for(record);
         batch->job[left++] = *job;
         continue;
@@ -328,7 +327,7 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
       rve_head(record->arena)->temperature = job->call.temperature;
       TRY(device_conduction(batch, job->rve, input ? &job->input : &nothing, duration));
       if (!record->last.status || !input) continue;
-      TRY(download(batch, job->rve));
+      TRY(rve_batch_download(batch, job->rve));
       rve_head(record->arena)->failed = record->last.status;
       TRY(rve_note_failure(batch, job->rve, &job->call, &nothing, duration, NULL));
     }
@@ -381,7 +380,7 @@ int64_t rve_batch_flown(const RveBatch *batch) { return batch->flown; }
 
 BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration,
                           RveAnswer *answer) {
-  TRY(check_index(batch, n, index));
+  TRY(rve_batch_check_index(batch, n, index));
   TRY(check_input(batch, n, input, duration));
   TRY(set_threads(batch));
   BaseStatus first = BASE_OK;
@@ -421,7 +420,7 @@ BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
     rve_head(batch->record[k].arena)->critical_time_step = rve_critical_time_step(scene, &packing);
     rve_record_set_rotation(&batch->record[k], scene);
     rve_packing_destroy(&packing);
-    TRY(upload(batch, k));
+    TRY(rve_batch_upload(batch, k));
   }
   if (!rve_conduction_is_same(scene, old))
     for (int k = 0; k < batch->count; k++) rve_conduction_forget(&batch->record[k].conduction);
@@ -429,83 +428,5 @@ BaseStatus rve_batch_set_scene(RveBatch *batch, const RveScene *scene) {
   batch->features = rve_scene_features(scene);
   TRY(set_threads(batch));
   /* Rows hold masses only in viscous variants; forces follow the new stiffness. */
-  return stiffer ? refresh(batch, batch->count, NULL) : BASE_OK;
-}
-
-/* RVEs that are changed alone part from their twins. */
-static void leave_twins(RveBatch *batch, int n, const int *index) {
-  for (int k = 0; k < n && (index || n < batch->count); k++) rve_twins_leave(batch, index ? index[k] : k);
-}
-
-BaseStatus rve_batch_install_bonds(RveBatch *batch, int n, const int *index) {
-  if (!batch->scene.bonds) return base_error(BASE_ERROR_ARGUMENT, "bonds = 0 (allowed: scenes with bonds)");
-  if (!index && n == 0) n = batch->count;
-  TRY(check_index(batch, n, index));
-  for (int k = 0; k < n; k++) {
-    const int rve = index ? index[k] : k;
-    TRY(download(batch, rve));
-    rve_record_install_bonds(&batch->record[rve]);
-  }
-  leave_twins(batch, n, index);
-  return refresh(batch, n, index);
-}
-
-BaseStatus rve_batch_rest(RveBatch *batch, int n, const int *index) {
-  if (!index && n == 0) n = batch->count;
-  TRY(check_index(batch, n, index));
-  for (int k = 0; k < n; k++) {
-    const int rve = index ? index[k] : k;
-    TRY(download(batch, rve));
-    rve_record_rest(&batch->record[rve]);
-  }
-  leave_twins(batch, n, index);
-  return refresh(batch, n, index);
-}
-
-/* ---------------------------------------------------------------------------------------------- states in and out */
-
-static BaseStatus check_rve(const RveBatch *batch, int rve) {
-  if (rve < 0 || rve >= batch->count)
-    return base_error(BASE_ERROR_ARGUMENT, "RVE %d (allowed: 0 to %d)", rve, batch->count - 1);
-  return BASE_OK;
-}
-
-size_t rve_batch_state_bytes(const RveBatch *batch, int rve) {
-  return rve < 0 || rve >= batch->count ? 0 : rve_record_state_bytes(&batch->record[rve]);
-}
-
-BaseStatus rve_batch_pack(const RveBatch *batch, int rve, void *bytes, size_t *written) {
-  TRY(check_rve(batch, rve));
-  TRY(download(batch, rve));
-  return rve_record_pack(&batch->record[rve], rve_scene_hash(&batch->scene), bytes, written);
-}
-
-BaseStatus rve_batch_unpack(RveBatch *batch, int rve, const void *bytes, size_t size) {
-  int canonical;
-  TRY(check_rve(batch, rve));
-  TRY(rve_record_unpack(batch->kernels, rve_scene_hash(&batch->scene), bytes, size, &batch->record[rve], &canonical));
-  rve_forget_failure(batch, rve);
-  rve_twins_leave(batch, rve);
-  if (canonical) return refresh(batch, 1, &rve);
-  return upload(batch, rve);
-}
-
-BaseStatus rve_batch_view(const RveBatch *batch, int rve, RveView *view) {
-  memset(view, 0, sizeof *view);
-  TRY(check_rve(batch, rve));
-  TRY(download(batch, rve));
-  return rve_record_view(&batch->record[rve], view);
-}
-
-BaseStatus rve_batch_packing(const RveBatch *batch, int rve, RvePacking *packing) {
-  memset(packing, 0, sizeof *packing);
-  TRY(check_rve(batch, rve));
-  TRY(download(batch, rve));
-  return rve_record_packing(&batch->record[rve], packing);
-}
-
-BaseStatus rve_batch_conduct(const RveBatch *batch, int rve, double time_step, int64_t steps, double *temperature) {
-  TRY(check_rve(batch, rve));
-  TRY(download(batch, rve));
-  return rve_record_conduct(&batch->record[rve], &batch->scene, time_step, steps, temperature);
+  return stiffer ? rve_batch_refresh(batch, batch->count, NULL) : BASE_OK;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The RveBatch as its own source files see it: rve_batch.c steps, rve_watchdog.c says why an RVE failed. */
+/* The RveBatch as its own source files see it: rve_batch.c steps, rve_batch_states.c takes states in and out,
+ * rve_watchdog.c says why an RVE failed. */
 #ifndef DEMPM_RVE_BATCH_PRIVATE_H
 #define DEMPM_RVE_BATCH_PRIVATE_H
 
@@ -51,6 +52,14 @@ struct RveBatch {
   RveDeviceJob *job; /* [count] on a device */
   char name[RVE_BACKEND_BYTES];
 };
+
+/* BASE_ERROR_ARGUMENT unless index[0..n) are RVEs of the batch (index NULL: its first n). */
+BaseStatus rve_batch_check_index(const RveBatch *batch, int n, const int *index);
+/* RVE k to and from the device; nothing without one. */
+BaseStatus rve_batch_upload(RveBatch *batch, int k);
+BaseStatus rve_batch_download(const RveBatch *batch, int k);
+/* Lists, forces and answers of RVEs index[0..n), after a change from outside. */
+BaseStatus rve_batch_refresh(RveBatch *batch, int n, const int *index);
 
 /* Sorts the call's RVEs by history and input into batch->twin[0..n). */
 void rve_twins_sort(RveBatch *batch, int n, const int *index, const RveInput *input);

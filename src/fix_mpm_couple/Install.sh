@@ -22,8 +22,8 @@ files="conduction_keywords.cpp conduction_keywords.h double_sum.h fix_bond_gran_
   fix_heat_gran_history.cpp fix_heat_gran_tables.cpp fix_heat_rest.cpp fix_heat_rest.h fix_mpm_couple.cpp
   fix_mpm_couple.h fix_mpm_couple_arrays.cpp fix_mpm_couple_heat.cpp fix_mpm_couple_output.cpp fix_mpm_couple_step.cpp
   fix_mpm_rve.cpp fix_mpm_rve.h fix_mpm_traction.cpp fix_mpm_traction.h fix_mpm_wall.cpp fix_mpm_wall.h heat_walls.cpp
-  heat_walls.h heat_walls_springs.cpp keyword_parser.cpp keyword_parser.h material_properties.cpp material_properties.h point_output.cpp
-  point_output.h rank_error.cpp rank_error.h restart_seal.cpp restart_seal.h"
+  heat_walls.h heat_walls_springs.cpp keyword_parser.cpp keyword_parser.h liggghts_walls.h material_properties.cpp
+  material_properties.h point_output.cpp point_output.h rank_error.cpp rank_error.h restart_seal.cpp restart_seal.h"
 vtk_files="fix_mpm_vtk.cpp fix_mpm_vtk.h"
 
 if test $mode = 0; then

@@ -235,6 +235,20 @@ void FixBondGranThermal::end_bonds(int i) {
               bonds.end());
 }
 
+/* Those of the pair style where the grains touch, else the bond's own. This grain's half. */
+void FixBondGranThermal::heat_by_dashpots(int i, const Bond &bond, double step) const {
+  GrainBondSprings springs = bond.springs;
+  if (shared(bond)) heat_->find_dashpots(i, bond.other, bond.state.overlap, &springs);
+  heat_->keep_damping(i, bond.other,
+                      0.5 * grain_bond_damping_work(&springs, &bond.state, effective_mass(i, bond.other), step));
+}
+
+bool FixBondGranThermal::holds(int i, int j) const {
+  for (const Bond &bond : bonds_[i])
+    if (bond.partner == atom->tag[j]) return true;
+  return false;
+}
+
 /* The pair style adds the step's slip to its spring: from this value it comes to zero, and never to Coulomb's limit. */
 void FixBondGranThermal::hold(int i, Bond &bond, double step) {
   double push[3], turn[3];
@@ -245,6 +259,7 @@ void FixBondGranThermal::hold(int i, Bond &bond, double step) {
     atom->torque[i][a] += turn[a];
     if (bond.history) bond.history[a] = shared(bond) ? -bond.sign * bond.state.velocity[a] * step : 0.0;
   }
+  if (heat_ && heat_->counts_damping() && step > 0.0) heat_by_dashpots(i, bond, step);
   count_[BONDS_INTACT] += 0.5;
   count_[ENERGY] += 0.5 * grain_bond_energy(&bond.springs, &bond.bond, &bond.state, shared(bond));
   if (!evflag) return;

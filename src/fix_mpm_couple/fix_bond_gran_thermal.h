@@ -36,6 +36,7 @@ class FixBondGranThermal : public Fix {
   void init();
   void setup_pre_force(int);
   void pre_force(int);
+  bool holds(int i, int j) const; /* grain i of this rank and its neighbour j are bonded */
   int modify_param(int, char **);
   double compute_scalar();
   double compute_vector(int);
@@ -113,6 +114,7 @@ class FixBondGranThermal : public Fix {
   void end_bonds(int i);
   void end_bond(Bond &bond);
   void hold(int i, Bond &bond, double step);
+  void heat_by_dashpots(int i, const Bond &bond, double step) const;
   bool shared(const Bond &bond) const { return bond.listed && bond.state.overlap > 0.0; }
 };
 

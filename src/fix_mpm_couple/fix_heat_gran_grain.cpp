@@ -39,13 +39,14 @@ FixHeatGranGrain::FixHeatGranGrain(LAMMPS *lammps, int narg, char **arg)
       radiation_(false),
       neighbours_(false),
       friction_(false),
-      damping_(false),
       correction_(false),
+      damping_(NO_DAMPING),
       conductivity_table_(false),
       capacity_table_(false),
       walls_(lammps),
       walls_found_(false),
       law_(HOOKE_STIFFNESS),
+      bonds_(NULL),
       reach_(0.0) {
   vector_flag = 1;
   size_vector = FLOWS;
@@ -85,7 +86,7 @@ void FixHeatGranGrain::read_model(KeywordParser &parser) {
     else if (parser.is("conductivity")) conductivity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("capacity")) capacity_table_ = parser.choice({"constant", "table"}) == 1;
     else if (parser.is("friction")) friction_ = parser.yes_no();
-    else if (parser.is("damping")) damping_ = parser.yes_no();
+    else if (parser.is("damping")) damping_ = (Damping)parser.choice({"no", "yes", "normal"});
   }
 }
 
@@ -114,7 +115,7 @@ void FixHeatGranGrain::check_keywords(const KeywordParser &parser) const {
   const bool conducts = model_.direct != GRAIN_DIRECT_NONE || model_.indirect != GRAIN_INDIRECT_NONE;
   if (parser.given("area_correction") && !conducts)
     parser.fail("keyword 'area_correction' has a meaning with a direct or an indirect model only");
-  if (damping_ && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
+  if (counts_damping() && !friction_) parser.fail("keyword 'damping' has a meaning with 'friction yes' only");
 }
 
 int FixHeatGranGrain::setmask() {
@@ -272,10 +273,24 @@ void FixHeatGranGrain::exchange(int i, int j, double *record) {
   }
 }
 
-double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
+/* Nothing if they are too far apart to be neighbours. */
+GrainView FixHeatGranGrain::view_of(const GrainPair &pair) const {
   const double sum = pair.radius[0] + pair.radius[1];
-  if (pair.distance - sum >= 0.5 * model_.reach * sum) return 0.0;
-  const GrainView view = grain_view(&pair, grain_face_radius(&pair, model_.porosity), surface_.emissivity);
+  if (pair.distance - sum >= 0.5 * model_.reach * sum) return {};
+  return grain_view(&pair, grain_face_radius(&pair, model_.porosity), surface_.emissivity);
+}
+
+GrainView FixHeatGranGrain::view_of_wall(const WallContact &contact) const {
+  const int i = contact.grain;
+  const double radius = atom->radius[i];
+  const double distance = find_real_distance(contact.distance, radius, atom->type[i], contact.type);
+  if (!contact.in_sight || distance - radius >= 0.5 * model_.reach * radius) return {};
+  const GrainPair mirror = {{radius, radius}, {}, 2.0 * distance};
+  return grain_view_wall(radius, distance, grain_face_radius(&mirror, model_.porosity), surface_.emissivity);
+}
+
+double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
+  const GrainView view = view_of(pair);
   hidden_[i] += view.share[0];
   if (j < atom->nlocal) hidden_[j] += view.share[1];
   const double temperature[2] = {Temp[i], Temp[j]};
@@ -283,15 +298,9 @@ double FixHeatGranGrain::radiate(int i, int j, const GrainPair &pair) {
 }
 
 double FixHeatGranGrain::radiate_to_wall(const WallContact &contact) {
-  const int i = contact.grain;
-  const double radius = atom->radius[i];
-  const double distance = find_real_distance(contact.distance, radius, atom->type[i], contact.type);
-  if (!contact.in_sight || distance - radius >= 0.5 * model_.reach * radius) return 0.0;
-  const GrainPair mirror = {{radius, radius}, {}, 2.0 * distance};
-  const double face = grain_face_radius(&mirror, model_.porosity);
-  const GrainView view = grain_view_wall(radius, distance, face, surface_.emissivity);
-  hidden_[i] += view.share[0];
-  const double temperature[2] = {Temp[i], contact.temperature};
+  const GrainView view = view_of_wall(contact);
+  hidden_[contact.grain] += view.share[0];
+  const double temperature[2] = {Temp[contact.grain], contact.temperature};
   return grain_radiation_between(view.area, temperature, surface_.absolute_zero);
 }
 

@@ -12,6 +12,7 @@ FixStyle(heat/gran/grain,FixHeatGranGrain)
 
 #include <vector>
 
+#include "../grain_bond/grain_bond.h"
 #include "../grain_heat/grain_heat.h"
 #include "../grain_heat/grain_table.h"
 #include "double_sum.h"
@@ -27,7 +28,7 @@ namespace LAMMPS_NS {
  *       [indirect none|voronoi_a|voronoi_b|layer] [fluid K] [porosity E] [core C] [reach F] [layer F] [minimum_gap S]
  *       [convection H T] [radiation EMISSIVITY T|none [neighbours]] [absolute_zero Z]
  *       [conductivity constant|table] [capacity constant|table]
- *       [friction yes|no] [damping yes|no]
+ *       [friction yes|no] [damping yes|normal|no]
  *
  * LIGGGHTS' base class brings the properties Temp, heatFlux, heatSource and directionalHeatFlux, the fix that
  * integrates Temp, and the scalar f_ID: sum of m c T, J. The vector f_ID: heat flows into the group in the last step,
@@ -51,10 +52,16 @@ class FixHeatGranGrain : public FixHeatGran {
   bool history_args(char **);
   /* With `friction`: the tangential spring at the head of a contact's history was set, not grown by slip. */
   void start_slip(double *history) const;
+  /* With `damping`, for bonds, before post_force(): the dashpots of the pair style between i and j; half of the work of a
+   * bond's dashpots in the step, J, for grain i. */
+  bool counts_damping() const { return damping_ != NO_DAMPING; }
+  void find_dashpots(int i, int j, double overlap, GrainBondSprings *springs) const;
+  void keep_damping(int i, int j, double work);
 
  private:
   friend class FixHeatRest; /* steps the same temperatures by the same conductances, while the grains are at rest */
   enum Flow { CONVECTION, RADIATION, WALLS, FRICTION, DAMPING, FLOWS };
+  enum Damping { NO_DAMPING, ALL_DAMPING, NORMAL_DAMPING }; /* of which dashpots */
   enum Law { HOOKE_STIFFNESS, HERTZ, HERTZ_STIFFNESS }; /* normal models of the pair style */
   static const char *const LAW_NAMES[3];
 
@@ -62,7 +69,8 @@ class FixHeatGranGrain : public FixHeatGran {
   GrainSurface surface_;
   bool convection_, radiation_;      /* to the surroundings */
   bool neighbours_;                  /* radiation between grains, and to walls of given temperature */
-  bool friction_, damping_, correction_;
+  bool friction_, correction_;
+  Damping damping_;
   bool conductivity_table_, capacity_table_;
   DoubleSum flow_[FLOWS];            /* W, this rank's part */
   HeatWalls walls_;
@@ -75,6 +83,8 @@ class FixHeatGranGrain : public FixHeatGran {
   std::vector<double> compliance_;   /* (1 - nu^2) / E, 1/Pa, by atom type; with collisions */
   std::vector<double> overlap_ratio_; /* real by simulated overlap, by pair of types; with area_correction */
   std::vector<double> conductivity_rows_, capacity_rows_; /* of tables: temperature, then a value per atom type */
+  class FixBondGranThermal *bonds_;  /* NULL if there are none; with friction */
+  std::vector<double> damped_;       /* J by grain, in bonds; from a step's pre_force() to its post_force() */
   double reach_;                     /* m, between surfaces: grains may be that far apart and conduct */
   std::vector<double> hidden_;       /* share of a grain's surface that neighbours take; with `neighbours` */
   std::vector<double> built_;        /* positions and radii when the neighbour list was built */
@@ -104,8 +114,11 @@ class FixHeatGranGrain : public FixHeatGran {
   double collide(int i, int j, const GrainPair &pair, double *record) const;
   void heat_by_friction();
   void slip(int i, int j, double *history);
+  GrainContact find_contact_of(int i, int j, double overlap) const;
   void find_walls();
   double find_wall_conductance(const WallContact &contact) const;
+  GrainView view_of(const GrainPair &pair) const;
+  GrainView view_of_wall(const WallContact &contact) const;
   double radiate(int i, int j, const GrainPair &pair);
   double radiate_to_wall(const WallContact &contact);
   void keep_positions();

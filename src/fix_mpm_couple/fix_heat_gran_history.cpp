@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "atom.h"
+#include "fix_bond_gran_thermal.h"
 #include "fix_contact_history.h"
 #include "fix_heat_gran_grain.h"
 #include "fix_scalar_transport_equation.h"
@@ -61,6 +62,9 @@ void FixHeatGranGrain::init_history() {
 const char *const FixHeatGranGrain::LAW_NAMES[3] = {"hooke/stiffness", "hertz", "hertz/stiffness"};
 
 void FixHeatGranGrain::init_friction() {
+  bonds_ = NULL;
+  for (int k = 0; k < modify->nfix; k++)
+    if (FixBondGranThermal *bonds = dynamic_cast<FixBondGranThermal *>(modify->fix[k])) bonds_ = bonds;
   int law = 0;
   while (law < 3 && !pair_gran->contact_match("normal", LAW_NAMES[law])) law++;
   /* The spring comes first in the history if nothing else of the pair style is in it. */
@@ -76,6 +80,7 @@ void FixHeatGranGrain::init_friction() {
   for (size_t a = 1; a < types; a++)
     for (size_t b = 1; b < types; b++) {
       laws_[a * types + b] = read_law(a, b);
+      if (damping_ == NORMAL_DAMPING) laws_[a * types + b].damping[1] = 0.0; /* off in the pair style */
       coulomb_[a * types + b] =
           MaterialProperties(lmp, this, a).of_pair("coefficientFriction", NumberRange::at_least(0.0), b);
     }
@@ -152,10 +157,26 @@ void FixHeatGranGrain::rub_walls() {
     double slip = grain_slip_work(&motion, stiffness, dt, before, touch.spring);
     /* The force is complete: the grain's next place is known, and whether the contact opens with a stretched spring. */
     if (overlap <= (parting + change) * dt) slip += 0.5 * stiffness[1] * stretch;
-    const double damp = damping_ ? grain_damping_work(&motion, &now, dt, before, touch.spring) : 0.0;
+    const double damp = counts_damping() ? grain_damping_work(&motion, &now, dt, before, touch.spring) : 0.0;
     heatFlux[i] += 0.5 * (slip + damp) / dt;
     flow_[FRICTION].add(0.5 * slip / dt), flow_[DAMPING].add(0.5 * damp / dt);
   }
+}
+
+GrainContact FixHeatGranGrain::find_contact_of(int i, int j, double overlap) const {
+  const double *m = atom->rmass, *r = atom->radius;
+  return find_contact(atom->type[i], atom->type[j], m[i] * m[j] / (m[i] + m[j]), r[i] * r[j] / (r[i] + r[j]), overlap);
+}
+
+void FixHeatGranGrain::find_dashpots(int i, int j, double overlap, GrainBondSprings *springs) const {
+  const GrainContact contact = find_contact_of(i, j, overlap);
+  springs->normal_damping = contact.damping[0], springs->tangential_damping = contact.damping[1];
+}
+
+void FixHeatGranGrain::keep_damping(int i, int j, double work) {
+  if (!(atom->mask[i] & atom->mask[j] & groupbit)) return;
+  damped_.resize(atom->nlocal, 0.0);
+  damped_[i] += work;
 }
 
 /* Half of the work to each grain. Contacts are in the lists of two ranks if the grains are: each heats its own. The
@@ -174,13 +195,12 @@ void FixHeatGranGrain::slip(int i, int j, double *history) {
   const double reach = motion.radius[0] + motion.radius[1];
   double stiffness = 0.0;
   if (square < reach * reach) {
-    const double mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
-    const GrainContact contact = find_contact(atom->type[i], atom->type[j], mass,
-                                              motion.radius[0] * motion.radius[1] / reach, reach - sqrt(square));
+    const GrainContact contact = find_contact_of(i, j, reach - sqrt(square));
     stiffness = contact.stiffness[1];
     const double both[2] = {before[3] > 0.0 ? before[3] : stiffness, stiffness}; /* 0: a new contact, or a spring that was set */
     work[0] = grain_slip_work(&motion, both, update->dt, before, history);
-    if (damping_) work[1] = grain_damping_work(&motion, &contact, update->dt, before, history);
+    if (counts_damping() && !(bonds_ && bonds_->holds(i, j)))
+      work[1] = grain_damping_work(&motion, &contact, update->dt, before, history);
   }
   for (const int grain : {i, j}) {
     if (grain >= atom->nlocal) continue;
@@ -199,6 +219,11 @@ void FixHeatGranGrain::start_slip(double *history) const {
 }
 
 void FixHeatGranGrain::heat_by_friction() {
+  for (size_t i = 0; i < damped_.size(); i++) {
+    heatFlux[i] += damped_[i] / update->dt;
+    flow_[DAMPING].add(damped_[i] / update->dt);
+  }
+  damped_.clear();
   const NeighList *list = pair_gran->list;
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];

@@ -78,7 +78,7 @@ FixHeatRest::FixHeatRest(LAMMPS *lammps, int narg, char **arg)
       walls_(0.0),
       spread_(NULL) {
   vector_flag = 1;
-  size_vector = 5;
+  size_vector = 6;
   global_freq = 1;
   extvector = 0;
   comm_forward = 1;
@@ -133,16 +133,9 @@ void FixHeatRest::find_heat() {
   }
   if (!heat_)
     fix_failed(lmp, this, "there is no fix heat/gran/grain: its models and its particles are those of this fix, too");
-  const char *const moving = heat_->neighbours_           ? "radiation ... neighbours"
-                             : heat_->conductivity_table_ ? "conductivity table"
-                             : heat_->capacity_table_     ? "capacity table"
-                                                          : NULL;
-  if (moving)
-    fix_failed(lmp, this,
-               format_text("fix %s (id %s) has '%s', which changes conductances or capacities with the temperature: "
-                           "allowed are models whose conductances are known once and for all",
-                           heat_->style, heat_->id, moving));
 }
+
+bool FixHeatRest::has_tables() const { return heat_->conductivity_table_ || heat_->capacity_table_; }
 
 /* What the user can change in the integration of LIGGGHTS' own fix, which this one replaces. */
 void FixHeatRest::check_integration() {
@@ -150,7 +143,7 @@ void FixHeatRest::check_integration() {
     fix_failed(lmp, this, format_text("the run_style is %s, allowed is verlet", update->integrate_style));
   FixScalarTransportEquation *equation = modify->find_fix_scalar_transport_equation("heattransfer");
   if (!equation) fix_failed(lmp, this, "LIGGGHTS' fix transportequation/scalar for the temperature is missing");
-  if (!(equation->*Access::integrates()))
+  if (!heat_->capacity_table_ && !(equation->*Access::integrates())) /* with the table fix heat/gran/grain stops it */
     fix_failed(lmp, this,
                format_text("the integration of temperatures was stopped (fix_modify %s integrate stop): allowed is "
                            "'integrate start'",
@@ -162,6 +155,7 @@ void FixHeatRest::freeze() {
   heat_->updatePtrs();
   heat_->find_walls();
   heat_->walls_found_ = true;
+  spread(heat_->Temp);
   std::vector<GrainLink> links;
   std::vector<GrainBath> baths;
   collect_links(links);
@@ -171,55 +165,99 @@ void FixHeatRest::freeze() {
   fix_check(lmp, this,
             grain_network_create(atom->nlocal, atom->nghost, (int64_t)links.size(), links.data(), (int)baths.size(),
                                  baths.data(), &network_));
-  set_capacities();
+  set_properties();
   solution_ = GrainSolution();
-  double mine[2] = {0.5 * (double)links.size(), 0.0}, all[2]; /* every pair has two links, on one rank or on two */
-  for (const GrainBath &bath : baths) mine[1] += bath.kind == GRAIN_BATH_WALL ? 1.0 : 0.0;
+  /* Every pair has two links, on one rank or on two. */
+  double mine[2] = {0.5 * (double)links.size(), (double)contacts_.size()}, all[2];
   MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, world);
   pairs_ = all[0], walls_ = all[1];
   find_limit(false);
 }
 
+/* With a table a pair counts whatever its conductivities are now: they may be 0. */
 void FixHeatRest::collect_links(std::vector<GrainLink> &links) {
   const NeighList *list = heat_->pair_gran->list;
+  heat_->hidden_.assign(atom->nlocal, 0.0);
   for (int n = 0; n < list->inum; n++) {
     const int i = list->ilist[n];
     for (int k = 0; k < list->numneigh[i]; k++) {
       const int j = list->firstneigh[i][k] & NEIGHMASK;
       if (!(atom->mask[i] & atom->mask[j] & heat_->groupbit)) continue;
-      const GrainPair pair = heat_->pair_of(i, j);
+      GrainPair pair = heat_->pair_of(i, j);
+      if (heat_->conductivity_table_) pair.conductivity[0] = pair.conductivity[1] = 1.0;
       const double h = grain_heat_conductance(&heat_->model_, &pair);
-      if (!(h > 0.0)) continue;
-      links.push_back({i, j, atom->tag[j], h});
-      if (j < atom->nlocal) links.push_back({j, i, atom->tag[i], h});
+      const GrainView view = heat_->neighbours_ ? heat_->view_of(pair) : GrainView();
+      heat_->hidden_[i] += view.share[0];
+      if (j < atom->nlocal) heat_->hidden_[j] += view.share[1];
+      if (!(h > 0.0 || view.area > 0.0)) continue;
+      links.push_back({i, j, atom->tag[j], h, view.area});
+      if (j < atom->nlocal) links.push_back({j, i, atom->tag[i], h, view.area});
     }
   }
 }
 
+/* Walls last, as contacts_. */
 void FixHeatRest::collect_baths(std::vector<GrainBath> &baths) {
   const GrainSurface &surface = heat_->surface_;
+  std::vector<GrainBath> walls;
+  contacts_.clear();
+  for (const WallContact &contact : heat_->walls_.find_contacts(heat_->find_wall_reach())) {
+    if (!(atom->mask[contact.grain] & heat_->groupbit)) continue;
+    const GrainView view = heat_->neighbours_ ? heat_->view_of_wall(contact) : GrainView();
+    heat_->hidden_[contact.grain] += view.share[0];
+    contacts_.push_back(contact);
+    walls.push_back({contact.grain, GRAIN_BATH_WALL, heat_->find_wall_conductance(contact), view.area,
+                     contact.temperature, 0.0});
+  }
   for (int i = 0; i < atom->nlocal; i++) {
     if (!(atom->mask[i] & heat_->groupbit)) continue;
     const double area = 4.0 * M_PI * atom->radius[i] * atom->radius[i];
     if (heat_->convection_)
-      baths.push_back({i, GRAIN_BATH_CONVECTION, surface.coefficient * area, surface.fluid_temperature});
-    if (heat_->radiation_) baths.push_back({i, GRAIN_BATH_RADIATION, 0.0, surface.surroundings});
+      baths.push_back({i, GRAIN_BATH_CONVECTION, surface.coefficient * area, 0.0, surface.fluid_temperature, 0.0});
+    if (heat_->radiation_)
+      baths.push_back({i, GRAIN_BATH_RADIATION, 0.0, surface.emissivity * area * fmax(1.0 - heat_->hidden_[i], 0.0),
+                       surface.surroundings, 0.0});
   }
-  for (const WallContact &contact : heat_->walls_.find_contacts(heat_->find_wall_reach()))
-    if (atom->mask[contact.grain] & heat_->groupbit)
-      baths.push_back({contact.grain, GRAIN_BATH_WALL, heat_->find_wall_conductance(contact), contact.temperature});
+  baths.insert(baths.end(), walls.begin(), walls.end());
 }
 
-void FixHeatRest::set_capacities() {
+void FixHeatRest::set_properties() {
   const int types = (int)heat_->conductivity_.size() - 1;
   FixPropertyGlobal *specific = static_cast<FixPropertyGlobal *>(
       modify->find_fix_property("thermalCapacity", "property/global", "peratomtype", types, 0, style));
-  network_->surface = heat_->surface_;
+  network_->absolute_zero = heat_->surface_.absolute_zero;
+  network_->varies = heat_->radiation_ || heat_->neighbours_ || has_tables();
+  network_->change.context = this;
+  if (has_tables())
+    network_->change.renew = [](void *fix, GrainNetwork *, const double *) { static_cast<FixHeatRest *>(fix)->renew(); };
+  if (heat_->capacity_table_)
+    network_->change.warm = [](void *fix, int grain, double temperature, double heat) {
+      return static_cast<FixHeatRest *>(fix)->warm(grain, temperature, heat);
+    };
   for (int i = 0; i < atom->nlocal; i++) {
     const double c = specific->compute_vector(atom->type[i] - 1);
-    network_->radius[i] = atom->radius[i];
     network_->capacity[i] = (atom->mask[i] & heat_->groupbit) && c > SMALLEST_CAPACITY ? c * atom->rmass[i] : 0.0;
   }
+}
+
+/* Properties of the temperatures in heat_->Temp, which all of this fix's steps and iterations work on. */
+void FixHeatRest::renew() {
+  GrainNetwork *n = network_;
+  for (int i = 0; i < n->grains; i++) {
+    for (int k = n->first[i]; heat_->conductivity_table_ && k < n->first[i + 1]; k++) {
+      const GrainPair pair = heat_->pair_of(i, n->other[k]);
+      n->conduction[k] = grain_heat_conductance(&heat_->model_, &pair);
+    }
+    if (heat_->capacity_table_ && (atom->mask[i] & heat_->groupbit))
+      n->capacity[i] = atom->rmass[i] * heat_->find_capacity(atom->type[i], heat_->Temp[i]);
+  }
+  for (size_t k = 0; k < contacts_.size(); k++)
+    n->bath[n->baths - contacts_.size() + k].conduction = heat_->find_wall_conductance(contacts_[k]);
+}
+
+double FixHeatRest::warm(int grain, double temperature, double heat) const {
+  const GrainTable table = heat_->make_table(heat_->capacity_rows_);
+  return grain_table_heat(&table, atom->type[grain], temperature, heat / atom->rmass[grain]);
 }
 
 /* ---------------------------------------------------------------------------------------------------- steps */
@@ -251,11 +289,8 @@ void FixHeatRest::begin() {
 void FixHeatRest::advance(bool is_shown) {
   heat_->updatePtrs();
   spread(heat_->Temp);
-  if (heat_->radiation_) {
-    if (solver_ == EXPLICIT) find_limit(true);
-    else grain_network_refresh(network_, heat_->Temp);
-  }
   if (solver_ != EXPLICIT) solve();
+  else if (network_->varies) find_limit(true);
   GrainSum flows[GRAIN_BATH_KINDS];
   grain_network_flow(network_, heat_->Temp, heat_->heatFlux, flows);
   keep_flows(flows);
@@ -325,6 +360,7 @@ void FixHeatRest::unpack_comm(int n, int first, double *buffer) {
 }
 
 double FixHeatRest::compute_vector(int n) {
-  const double values[5] = {limit_, pairs_, walls_, (double)solution_.iterations, solution_.residual};
+  const double values[6] = {limit_, pairs_, walls_, (double)solution_.iterations, solution_.residual,
+                            (double)solution_.renewals};
   return values[n];
 }

@@ -14,6 +14,7 @@ FixStyle(heat/rest,FixHeatRest)
 
 #include "../grain_heat/grain_network.h"
 #include "fix.h"
+#include "heat_walls.h"
 
 namespace LAMMPS_NS {
 
@@ -25,7 +26,7 @@ class Integrate;
  *   fix ID all heat/rest [solver explicit|implicit|steady] [tolerance T]
  *
  * The vector f_ID: 1 limit of the explicit time step, s; 2 conducting pairs; 3 contacts with walls of a temperature; 4
- * iterations and 5 residual of the last step. */
+ * iterations and 5 residual of the last step; 6 its linearisations. */
 class FixHeatRest : public Fix {
  public:
   FixHeatRest(class LAMMPS *, int, char **);
@@ -49,16 +50,20 @@ class FixHeatRest : public Fix {
   FixHeatGranGrain *heat_;
   Integrate *mine_, *theirs_; /* this fix's integrator, and the one whose place it takes (owned while it does) */
   GrainNetwork *network_;
+  std::vector<WallContact> contacts_; /* behind the network's baths GRAIN_BATH_WALL, the last ones */
   GrainSolution solution_;
   double limit_;         /* s */
   double pairs_, walls_; /* on all ranks */
   double *spread_;       /* what pack_comm() sends */
 
+  bool has_tables() const;
   void find_heat();
   void check_integration();
   void collect_links(std::vector<GrainLink> &links);
   void collect_baths(std::vector<GrainBath> &baths);
-  void set_capacities();
+  void set_properties();
+  void renew();
+  double warm(int grain, double temperature, double heat) const;
   void find_limit(bool check);
   void solve();
   void keep_flows(const GrainSum *flows);

@@ -51,6 +51,18 @@ void grain_bond_force(const GrainBondSprings *springs, const GrainBond *bond, co
   }
 }
 
+double grain_bond_damping_work(const GrainBondSprings *springs, const GrainBondState *state, double mass, double step) {
+  const double half = 0.5 * step / mass, force = springs->normal * state->approach;
+  const double parting = state->separation, across = springs->tangential_damping;
+  double power =
+      springs->normal_damping * parting * (parting + half * (force - springs->normal_damping * parting));
+  for (int a = 0; a < 3; a++) {
+    const double back = -springs->tangential * state->spring[a] - across * state->velocity[a];
+    power += across * state->velocity[a] * (state->velocity[a] + 3.5 * half * back);
+  }
+  return power * step;
+}
+
 double grain_bond_energy(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state,
                          int shared) {
   double square = state->approach * state->approach;

@@ -60,6 +60,10 @@ GrainBondEnd grain_bond_advance(const GrainBondLaw *law, const GrainBondSprings 
 void grain_bond_force(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state, int shared,
                       double force[3], double torque[3]);
 
+/* Work of the dashpots in springs->..._damping in a step of duration `step`, J, whoever exerts them, between grains of the
+ * effective mass `mass`, kg: as grain_damping_work(), with the velocities half-way to those of the next step. */
+double grain_bond_damping_work(const GrainBondSprings *springs, const GrainBondState *state, double mass, double step);
+
 /* Elastic energy, J, beside that of the contact's normal spring if it is `shared`. */
 double grain_bond_energy(const GrainBondSprings *springs, const GrainBond *bond, const GrainBondState *state,
                          int shared);

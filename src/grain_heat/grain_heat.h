@@ -168,8 +168,10 @@ double grain_convection(const GrainSurface *exchange, double radius, double temp
 /* Stefan-Boltzmann: sigma emissivity 4 pi R^2 (T_s^4 - T^4), absolute temperatures, W. Surroundings are black or
  * large. */
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature);
-/* The same heat over T_s - T: a conductance, W/K. */
-double grain_radiation_conductance(const GrainSurface *exchange, double radius, double temperature);
+/* sigma (T1^4 - T0^4) / (T1 - T0), absolute temperatures, W/(m2 K): of a black surface, a conductance by area; of equal
+ * temperatures the derivative 4 sigma T^3. The same bits if both change places. Below the absolute zero, where iterates of
+ * a solver may come, as at it. */
+double grain_emission(const double temperature[2], double absolute_zero);
 
 /* Two grains that see each other through the Voronoi face between them, a circle of radius `face`; or a grain (0) and a
  * plane. Seen from either centre the face bounds a cap of the surface, without the contact. The smaller cap sees the

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Grains at rest as a network of conductances that is set up once: heat flows, explicit steps, implicit steps and
- * steady states. One rank's part; what others know comes by GrainRanks.
+/* Grains at rest as a network of conductances whose geometry is set up once: heat flows, explicit steps, implicit steps
+ * and steady states. One rank's part; what others know comes by GrainRanks.
  *
- * C_i dT_i/dt = SUM_j h_ij (T_j - T_i) + SUM_b h_b (T_b - T_i) + s_i, with baths b: walls, fluid, surroundings. */
+ * C_i dT_i/dt = SUM_j h_ij (T_j - T_i) + SUM_b h_b (T_b - T_i) + s_i, with baths b: walls, fluid, surroundings.
+ * h = conduction + area * grain_emission() at the temperatures of both ends; conduction and C may depend on them, too
+ * (GrainChange). */
 #ifndef DEMPM_GRAIN_NETWORK_H
 #define DEMPM_GRAIN_NETWORK_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "grain_heat.h"
@@ -19,7 +22,8 @@ extern "C" {
 typedef struct GrainLink {
   int grain, other;   /* `other` may be beyond the grains of this rank: a copy of another's, or of a periodic image */
   int64_t order;      /* links of a grain are sorted by this: sums then do not depend on how grains are stored */
-  double conductance; /* W/K, > 0 */
+  double conduction;  /* W/K, >= 0 */
+  double area;        /* of radiation, m2, >= 0 */
 } GrainLink;
 
 typedef enum GrainBathKind {
@@ -32,21 +36,37 @@ typedef enum GrainBathKind {
 typedef struct GrainBath {
   int grain;
   GrainBathKind kind;
-  double conductance; /* W/K; of radiation worked out anew in each step, from the grain's temperature */
+  double conduction;  /* W/K */
+  double area;        /* of radiation, m2 */
   double temperature;
+  double conductance; /* W/K, by grain_network_refresh() */
 } GrainBath;
+
+struct GrainNetwork;
+/* Properties over temperature. */
+typedef struct GrainChange {
+  void *context;
+  /* Sets conduction (of links and baths) and capacity to those at the temperatures T, copies included. NULL: constant. */
+  void (*renew)(void *context, struct GrainNetwork *network, const double *T);
+  /* The temperature to which `heat` (J) takes a grain from T. NULL: T + heat / capacity. */
+  double (*warm)(void *context, int grain, double T, double heat);
+} GrainChange;
 
 typedef struct GrainNetwork {
   int grains;         /* of this rank; arrays of temperatures may be longer, by the copies */
   int *first;         /* [grains + 1] into other, conductance */
   int *other;
-  double *conductance; /* W/K */
-  double *capacity;    /* [grains] m c, J/K, to be set after creation; 0: the grain keeps its temperature */
-  double *radius;      /* [grains] m, to be set for radiation */
-  GrainSurface surface; /* of radiation */
-  int baths;
+  double *conduction, *area; /* W/K, m2 */
+  double *conductance; /* W/K, by grain_network_refresh() */
+  double *capacity;    /* [grains] m c, J/K, to be set after creation or by renew(); 0: the grain keeps its temperature */
+  int copies, baths;
   GrainBath *bath;
-  double *own;  /* [grains] sum of the conductances of a grain's baths, W/K */
+  double *own;   /* [grains] sum of the conductances of a grain's baths, W/K */
+  double *slope; /* [grains] derivative of the heat that a grain gives to its baths, W/K */
+  /* To be set after creation: */
+  double absolute_zero; /* of the scale of temperatures */
+  bool varies;          /* conductances or capacities depend on temperatures, on some rank: all ranks agree */
+  GrainChange change;
   double *work; /* of the solver */
 } GrainNetwork;
 
@@ -56,8 +76,8 @@ BaseStatus grain_network_create(int grains, int copies, int64_t links, GrainLink
                                 const GrainBath *bath, GrainNetwork **network);
 void grain_network_destroy(GrainNetwork *network); /* accepts NULL */
 
-/* Sums of the baths' conductances, with those of radiation at the temperatures T. Needed after creation, and before
- * each step if there is radiation. */
+/* Conductances (and capacities) at the temperatures T, copies included, and their sums over baths. Needed after
+ * creation, and before each explicit step of a network that varies. */
 void grain_network_refresh(GrainNetwork *network, const double *T);
 /* min C / sum h over the grains of this rank, s; HUGE_VAL if nothing conducts. An explicit step up to it keeps each new
  * temperature between those around it. *grain: the grain it belongs to, -1 if none. */
@@ -71,7 +91,7 @@ typedef struct GrainSum {
 /* heat [grains], W: into each grain from others and from baths, at temperatures T. flows [GRAIN_BATH_KINDS], W: from
  * baths into the grains of this rank. */
 void grain_network_flow(const GrainNetwork *network, const double *T, double *heat, GrainSum *flows);
-/* T += (heat + source) step / C. */
+/* Heat of a step into the grains: T += (heat + source) step / C, or by change.warm(). */
 void grain_network_advance(const GrainNetwork *network, double step, const double *heat, const double *source,
                            double *T);
 
@@ -83,15 +103,21 @@ typedef struct GrainRanks {
 } GrainRanks;
 
 typedef struct GrainSolution {
-  int iterations;
+  int iterations;  /* of the conjugate gradients, in all linearisations */
+  int renewals;    /* linearisations: 1 if the network does not vary, 0 if there was nothing to do */
   double residual; /* heat that is not balanced, over the heat that flows through grains (norms weighted by 1/C) */
 } GrainSolution;
 
-/* Backward Euler: C (T - T0) / step = flows at T + source; step = HUGE_VAL: the steady state. T (with its copies) goes
- * from T0 to T. Conjugate gradients, until the residual is below `tolerance` or lost in round-off. The capacity is the
- * preconditioner: no iterate then changes the heat of grains that no bath reaches, which is kept to round-off whatever
- * the tolerance. A group of grains without baths so has a steady state, its mean; with sources it has none:
- * BASE_ERROR_UNSTABLE after `most` iterations, on all ranks. */
+/* Backward Euler: (heat that takes T0 to T) / step = flows at T + source; step = HUGE_VAL: the steady state. T (with its
+ * copies) goes from T0 to T. Conjugate gradients, until the residual is below `tolerance` or lost in round-off. The
+ * capacity is the preconditioner: no iterate then changes the heat of grains that no bath reaches, which is kept to
+ * round-off whatever the tolerance. A group of grains without baths so has a steady state, its mean; with sources it has
+ * none: BASE_ERROR_UNSTABLE after `most` iterations, on all ranks.
+ *
+ * A network that varies: Picard iteration. Each linearisation has the conductances of the links at the last temperatures
+ * (the matrix stays symmetric), Newton's capacities and slopes of the baths; its correction is brought in as heat, so
+ * that this is kept with capacities over temperature, too, and halved until the residual falls. The residual is that of
+ * the flows at T, to the same tolerance. BASE_ERROR_UNSTABLE if no correction makes it fall, or after 100. */
 BaseStatus grain_network_solve(GrainNetwork *network, const GrainRanks *ranks, double step, double tolerance, int most,
                                const double *source, double *T, GrainSolution *solution);
 

@@ -20,9 +20,8 @@ static double find_emission(double from, double to, double zero) {
 
 static double emit(double from, double to, double zero) { return (from - to) * find_emission(from, to, zero); }
 
-double grain_radiation_conductance(const GrainSurface *exchange, double radius, double temperature) {
-  return exchange->emissivity * surface(radius) *
-         find_emission(exchange->surroundings, temperature, exchange->absolute_zero);
+double grain_emission(const double temperature[2], double absolute_zero) {
+  return find_emission(fmax(temperature[1], absolute_zero), fmax(temperature[0], absolute_zero), absolute_zero);
 }
 
 double grain_radiation(const GrainSurface *exchange, double radius, double temperature) {

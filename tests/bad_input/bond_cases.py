@@ -1,20 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Wrong scripts for fix expansion/gran and fix bond/gran/thermal; see cases.py."""
-from cases import Case
+from cases import TWO_GRAINS, Case
 
-BOND_BASE = """\
-atom_style      granular
-atom_modify     map array
-units           si
-newton          off
-communicate     single vel yes
-boundary        f f f
-region          box block 0 0.04 0 0.02 0 0.02 units box
-create_box      1 box
-create_atoms    1 single 0.01 0.01 0.01 units box
-create_atoms    1 single 0.0195 0.01 0.01 units box
-set             group all diameter 0.01 density 2500
-neighbor        0.003 bin
+BOND_BASE = TWO_GRAINS + """\
 fix kn all property/global kn peratomtypepair 1 1e5
 fix kt all property/global kt peratomtypepair 1 8e4
 fix gn all property/global gamman peratomtypepair 1 100

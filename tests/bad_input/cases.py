@@ -41,6 +41,22 @@ thermo_style    custom step f_mpm[1]
 run             2
 """
 
+# Two LIGGGHTS particles that overlap, before properties and pair style.
+TWO_GRAINS = """\
+atom_style      granular
+atom_modify     map array
+units           si
+newton          off
+communicate     single vel yes
+boundary        f f f
+region          box block 0 0.04 0 0.02 0 0.02 units box
+create_box      1 box
+create_atoms    1 single 0.01 0.01 0.01 units box
+create_atoms    1 single 0.0195 0.01 0.01 units box
+set             group all diameter 0.01 density 2500
+neighbor        0.003 bin
+"""
+
 # A square crystal, 4 x 4 disks of radius 0.01 m, overlapping by 1 %.
 SPACING = 0.0198
 

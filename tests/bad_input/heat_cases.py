@@ -1,20 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Wrong scripts for fix heat/gran/grain; see cases.py."""
-from cases import Case
+from cases import TWO_GRAINS, Case
 
-HEAT_BASE = """\
-atom_style      granular
-atom_modify     map array
-units           si
-newton          off
-communicate     single vel yes
-boundary        f f f
-region          box block 0 0.04 0 0.02 0 0.02 units box
-create_box      1 box
-create_atoms    1 single 0.01 0.01 0.01 units box
-create_atoms    1 single 0.0195 0.01 0.01 units box
-set             group all diameter 0.01 density 2500
-neighbor        0.003 bin
+HEAT_BASE = TWO_GRAINS + """\
 fix m1 all property/global youngsModulus peratomtype 5e6
 fix m2 all property/global poissonsRatio peratomtype 0.3
 fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5
@@ -102,7 +90,7 @@ HEAT_CASES = [
           "fix floor all wall/gran model hooke/stiffness tangential no_history primitive type 1 zplane 0.0\nrun 2"),
          "'friction'", "fix floor", "tangential history"),
     heat("damping_without_friction", "reach 0.5", "reach 0.5 damping yes", "'damping'", "'friction yes'"),
-    heat("damping_maybe", "reach 0.5", "reach 0.5 friction yes damping 0.5", "'damping'", "'0.5'", "no or yes"),
+    heat("damping_maybe", "reach 0.5", "reach 0.5 friction yes damping 0.5", "'damping'", "'0.5'", "no, yes or normal"),
     heat("neighbours_skin", ("direct pipe area hertz", VORONOI, "neighbor        0.003"),
          ("direct none", "radiation 0.8 300 neighbours reach 0.7", "neighbor        0.0034"), "skin", "0.0034",
          "> 0.0035"),

@@ -4,7 +4,14 @@ from cases import Case
 from heat_cases import HEAT_BASE, HeatCase
 
 HEAT = HEAT_BASE[HEAT_BASE.index("fix heat all"):HEAT_BASE.index("run ")]
+HEAT_WORDS = HEAT[HEAT.index("pipe"):]
 SOURCE = "set atom 1 property/atom heatSource 1.0\n"
+# A wall at 400 K that conducts nothing below 500 K, then so well that the grain could not have 500 K.
+JUMP = """fix kt all property/global thermalConductivityTable matrix 2 500 0.001 500.0000001 1000
+fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.0051 temperature 400
+run 0
+set group all property/atom heatSource 1.0
+"""
 
 
 def rest(name, words, *message, old="", new=""):
@@ -32,8 +39,8 @@ REST_CASES = [
          "integrate start"),
     rest("respa", "run_style respa 2 2 pair 2\nfix rest all heat/rest", "respa", "verlet"),
     rest("no_steady_state", f"run 0\n{SOURCE}fix rest all heat/rest solver steady", "no balance", "source", "allowed is"),
-    rest("radiation_between", "", "'radiation ... neighbours'", "once and for all", old="reach 0.5\n",
-         new="reach 0.5 radiation 0.8 300 neighbours\n"),
+    rest("jump", JUMP + "fix rest all heat/rest solver steady", "tables", "do not agree after", "allowed is", "smoother tables",
+         old=HEAT_WORDS, new="pipe conductivity table\n"),
     Case("rest_material_points", "run             2", "fix rest all heat/rest\nrun             2", "heat/rest",
          ("fix mpm/couple (id mpm)", "material points", "unfix")),
 ]

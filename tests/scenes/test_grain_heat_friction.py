@@ -277,13 +277,16 @@ def test_friction_and_collisions_keep_separate_records(dempm, tmp_path):
 
 
 # ----------------------------------------------------------------------------------------------------- damping
-@pytest.mark.parametrize("damped", [False, True], ids=["friction", "damping"])
+@pytest.mark.parametrize("damped", [False, True, "normal"], ids=["friction", "damping", "normal"])
 @pytest.mark.parametrize("name", ["hooke/stiffness", "hertz", "hertz/stiffness"])
 def test_all_lost_energy_becomes_heat(name, damped, dempm, tmp_path):
+    """`normal`: there are no dashpots across, tangential_damping off."""
     errors = []
     for dt in (4e-6, 2e-6):
         script = impact(dt).replace(SPRINGS.format(dt=dt), model_of(name, damped).format(dt=dt))
         script = script.replace("f_heat[4] ke", "f_heat[4] f_heat[5] ke")
+        if damped == "normal":
+            script = script.replace("damping yes", "damping normal").replace("l history", "l history tangential_damping off")
         run = dempm(script, cwd=tmp_path / str(dt))
         (_, first), (_, end) = run.dump("end.dump")
         lost = kinetic(first) - kinetic(end)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """A run of `make verify-full` that is cut goes on from its last restart file, to the last bit."""
+import json
 import pathlib
 import sys
 
@@ -44,10 +45,13 @@ def test_a_run_that_is_cut_goes_on_to_the_last_bit(damage, tmp_path, monkeypatch
     with pytest.raises(RuntimeError):
         cut.run("block", "in.block", files=[script], threads=1)
     path = tmp_path / "cut" / "block"
+    part = json.loads((path / "begun.json").read_text())
+    assert 0.0 < part["processor"] <= 4.0 * part["seconds"]
     newest = resume.restart_files(path)[0]
     if damage:
         newest.write_bytes(newest.read_bytes()[: newest.stat().st_size // 2])
     again = cut.run("block", "in.block", files=[script], threads=1)
+    assert again.processor > part["processor"] and again.seconds > part["seconds"]
     assert (path / "in.resumed").exists() and not list(path.glob("part.*")) and not resume.restart_files(path)
     assert again.table["Step"] == list(range(0, 1401, 100))
     for column, values in whole.table.items():

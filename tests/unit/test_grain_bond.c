@@ -92,6 +92,26 @@ static void both_grains_see_the_same_bond(void **state) {
 }
 
 /* Along the normal, and across it. */
+/* Of a bond made in contact: as of a contact that does not slip. */
+static void dashpots_work_as_those_of_a_contact(void **state) {
+  (void)state;
+  const GrainMotion motion = pair(0.0089);
+  GrainBond bond = {0.0, {3e-6, 1e-6, -2e-6}};
+  GrainBondState now;
+  const double step = 1e-5, mass = 1e-3;
+  grain_bond_advance(&law, &springs, &motion, &bond, 300.0, step, &now);
+  const GrainContact contact = {{1e5, 8e4}, {20.0, 10.0}, mass};
+  const double expected = grain_damping_work(&motion, &contact, step, bond.spring, now.spring);
+  assert_true(expected > 0.0);
+  assert_float_equal(grain_bond_damping_work(&springs, &now, mass, step), expected, 1e-12 * expected);
+  /* A gap shortens the bond further: the push along it rises by kn gap, and with it the mean speed. */
+  const double before = grain_bond_damping_work(&springs, &now, mass, step);
+  bond.gap = 1e-5;
+  grain_bond_advance(&law, &springs, &motion, &bond, 300.0, step, &now);
+  const double more = 20.0 * now.separation * 0.5 * step / mass * 1e5 * 1e-5 * step;
+  assert_float_equal(grain_bond_damping_work(&springs, &now, mass, step), before + more, 1e-12 * expected);
+}
+
 static void force_is_the_slope_of_the_energy(void **state) {
   (void)state;
   const GrainBondSprings elastic = {1e5, 8e4, 0.0, 0.0};
@@ -118,6 +138,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(strength_falls_between_reference_and_melting),
                                      cmocka_unit_test(bonds_end_by_tension_shear_and_melting),
                                      cmocka_unit_test(both_grains_see_the_same_bond),
+                                     cmocka_unit_test(dashpots_work_as_those_of_a_contact),
                                      cmocka_unit_test(force_is_the_slope_of_the_energy)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -88,6 +88,13 @@ static void surfaces_exchange_heat_by_newton_and_stefan_boltzmann(void **state) 
        4.0 * 64e6 * small * (1.0 - 1.5 * small / 400.0));
   AT_MOST(worst, 1e-14);
   assert_true(grain_radiation(&kelvin, 0.01, 400.0) == 0.0 && grain_convection(&kelvin, 0.01, 300.0) == 0.0);
+  /* As a conductance; of equal temperatures the derivative; the same from both sides; none below the absolute zero. */
+  worst = 0.0;
+  const double both[2] = {500.0, 400.0}, turned[2] = {400.0, 500.0}, equal[2] = {400.0, 400.0}, none[2] = {-5.0, 0.0};
+  note(&worst, grain_emission(both, 0.0), 5.670374419e-8 * (625e8 - 256e8) / 100.0);
+  note(&worst, grain_emission(equal, 0.0), 4.0 * 5.670374419e-8 * 64e6);
+  AT_MOST(worst, 1e-14);
+  assert_true(grain_emission(both, 0.0) == grain_emission(turned, 0.0) && grain_emission(none, 0.0) == 0.0);
   /* The same on the scale of Celsius. */
   const GrainSurface celsius = {.emissivity = 0.8, .surroundings = 400.0 - 273.15, .absolute_zero = -273.15};
   worst = 0.0;

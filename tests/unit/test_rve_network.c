@@ -205,6 +205,30 @@ static void networks_of_crystals_are_affine_with_any_model(void **state) {
   assert_true(apart < 1e-13);
 }
 
+/* Grains that have grown: contacts and gaps are those of the radii at the temperature, with any model. */
+static void crystals_of_warm_grains(void **state) {
+  (void)state;
+  double error = 0.0, change = 0.0;
+  for (int model = 0; model < MODELS; model++) {
+    RvePacking cell;
+    MUST(rve_packing_lattice(RVE_HEXAGONAL, 5e-3, 0.01, &cell));
+    RveScene scene = model_scene(cell.dimension, model);
+    scene.expansion = 1e-5;
+    RveBatch *batch = help_batch(&scene, &cell);
+    double cold[6], expected[6];
+    lattice_sum(&cell, &scene, cold);
+    const RveAnswer answer = help_step(batch, NULL, scene.reference_temperature + 40.0, 1e-3);
+    cell.radius[0] *= 1.0 + 40.0 * scene.expansion;
+    lattice_sum(&cell, &scene, expected);
+    error = fmax(error, help_difference(6, answer.conductivity, expected));
+    if (model > 0) change = fmax(change, help_difference(6, cold, expected));
+    rve_batch_destroy(batch);
+    rve_packing_destroy(&cell);
+  }
+  help_report("crystals of warm grains: network against lattice sum", error);
+  assert_true(error < 1e-9 && change > 1e-3);
+}
+
 /* Contacts from the view, by the dense solver. */
 static void packings_meet_the_dense_solution_below_the_affine_sum(void **state) {
   (void)state;
@@ -284,6 +308,47 @@ static void kept_networks_stay_near_solved_ones(void **state) {
     rve_batch_destroy(some);
   }
   rve_packing_destroy(&packing);
+}
+
+/* |a - b| over |b|, of all nine components. */
+static double tensor_change(const double a[6], const double b[6]) {
+  double x[9], y[9], apart = 0.0, size = 0.0;
+  help_full(a, x), help_full(b, y);
+  for (int m = 0; m < 9; m++) apart += (x[m] - y[m]) * (x[m] - y[m]), size += y[m] * y[m];
+  return sqrt(apart / size);
+}
+
+/* When the affine tensor has changed by `change` since the last solution, or the strain path is that long: a crystal of three
+ * contact directions whose tensor shears with the grains, and one that turns as a whole. */
+static void networks_are_solved_when_they_should_be(void **state) {
+  (void)state;
+  const double turn[9] = {0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0}, across[9] = {0.0, 0.1, 0.0, 0.1};
+  for (int way = 0; way < 2; way++) {
+    RvePacking cell;
+    MUST(rve_packing_lattice(RVE_HEXAGONAL, 5e-3, 0.01, &cell));
+    RveScene scene = model_scene(2, 1);
+    scene.network_change = 0.01;
+    RveBatch *batch = help_batch(&scene, &cell);
+    double solved_affine[6], path = 0.0, largest = 0.0;
+    const RveAnswer first = help_step(batch, NULL, 0.0, 0.0);
+    memcpy(solved_affine, first.conductivity_affine, sizeof solved_affine);
+    int64_t solved, kept, before, times = 0;
+    rve_batch_network_counts(batch, &before, &kept);
+    for (int call = 0; call < 40; call++) {
+      const RveAnswer answer = help_step(batch, way ? across : turn, 0.0, 1e-3);
+      path += (way ? 0.1 : 1.0) * sqrt(2.0) * 1e-3;
+      const double change = tensor_change(answer.conductivity_affine, solved_affine);
+      rve_batch_network_counts(batch, &solved, &kept);
+      assert_int_equal(solved - before, change > 0.01 || path > 0.01);
+      largest = fmax(largest, change);
+      if (solved > before) times++, path = 0.0, memcpy(solved_affine, answer.conductivity_affine, sizeof solved_affine);
+      before = solved;
+    }
+    printf("           %s: solved %d times in 40 calls\n", way ? "sheared" : "turned", (int)times);
+    assert_true(way ? largest > 0.01 && times > 5 : largest < 0.01 && times == 5);
+    rve_batch_destroy(batch);
+    rve_packing_destroy(&cell);
+  }
 }
 
 static void asking_again_changes_nothing_and_states_carry_all(void **state) {
@@ -377,6 +442,8 @@ int main(void) {
       cmocka_unit_test(random_networks_meet_the_dense_solution),
       cmocka_unit_test(networks_of_crystals_are_affine_with_any_model),
       cmocka_unit_test(packings_meet_the_dense_solution_below_the_affine_sum),
+      cmocka_unit_test(crystals_of_warm_grains),
+      cmocka_unit_test(networks_are_solved_when_they_should_be),
       cmocka_unit_test(kept_networks_stay_near_solved_ones),
       cmocka_unit_test(asking_again_changes_nothing_and_states_carry_all),
       cmocka_unit_test(other_parameters_are_answered_at_once),

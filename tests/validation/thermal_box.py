@@ -15,7 +15,7 @@ import sys
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from thermal_report import Report, Run  # noqa: E402
+from report import Report, Run  # noqa: E402
 
 GRAINS, SIDE, DENSITY, CONDUCTIVITY, CAPACITY = 4454, 0.6, 2500.0, 2000.0, 100.0
 MEAN, DEVIATION, SMALLEST, LARGEST = 4.83e-3, 0.53e-3, 2.56e-3, 7.92e-3
@@ -210,7 +210,7 @@ def main():
     kappa, wall = conductivity(report, n, grains)
     cooling(report, n, grains, kappa, wall, area)
     speed(report, grains)
-    report.write()
+    sys.exit(report.write())
 
 
 def conductivity(report, n, grains):

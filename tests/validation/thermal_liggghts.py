@@ -10,7 +10,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 sys.path.insert(1, str(pathlib.Path(__file__).resolve().parents[1] / "scenes"))
-from thermal_report import Report, Run, stock  # noqa: E402  first: it knows the way to the next one's modules
+from report import Report, Run, stock  # noqa: E402  first: it knows the way to the next one's modules
 from test_grain_heat import OUTPUT, PAIR_ROWS, box, grains, packing, properties  # noqa: E402
 
 STEPS = 10000
@@ -112,7 +112,7 @@ def main():
               f"{moved:.1f}")
         report.check(f"{name}, {len(last)} grains: temperatures over {STEPS} steps, relative",
                      max(abs(a - b) for a, b in zip(T, reference)) / max(map(abs, reference)), 1e-10, ours.seconds + theirs.seconds)
-    report.write()
+    sys.exit(report.write())
 
 
 if __name__ == "__main__":

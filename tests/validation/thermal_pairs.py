@@ -11,7 +11,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from thermal_report import BUILD, Report  # noqa: E402
+from report import BUILD, Report  # noqa: E402
 
 MODELS = ["batchelor", "liggghts", "pipe", "collisional", "voronoi_a", "voronoi_b", "layer"]
 
@@ -28,7 +28,7 @@ def main():
         report.check(f"{model}: largest relative deviation from the reference values", reference[model], 1e-10)
         if model in own:
             report.check(f"{model}: largest relative deviation from own quadrature, 192 pairs", own[model], 1e-10)
-    report.write()
+    sys.exit(report.write())
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 """Runs that go on after an interruption. A script of examples/ (one that ends in `run ${steps}`) is given two restart files, written
 in turn; after a cut its continuation reads the newer one that is whole. What the parts wrote is put together at the end: of each part
 what lies before the next one's start."""
+import os
+import pathlib
 import re
 import shutil
 
@@ -51,6 +53,16 @@ def first_step(log):
 def present_step(log):
     found, _ = rows(log)
     return found[-1][1] if found else None
+
+
+def user_time(process):
+    """Seconds that a process, its children and those of theirs have had a processor for, so far; 0 where /proc does not tell."""
+    try:
+        fields = pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        children = pathlib.Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[13])) / os.sysconf("SC_CLK_TCK") + sum(map(user_time, children))
 
 
 def restart_files(path):

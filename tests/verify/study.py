@@ -79,10 +79,9 @@ class Study:
             for source in sources:
                 shutil.copy(source, path)
             (path / "out").mkdir(exist_ok=True)
-            begun.write_text(json.dumps({"wanted": wanted, "seconds": 0.0}))
+            begun.write_text(json.dumps({"wanted": wanted, "seconds": 0.0, "processor": 0.0}))
         launch = [os.environ.get("MPIRUN", "mpirun"), "-np", str(ranks)] if ranks > 1 else []
         words = [w for key, value in variables.items() for w in ("-var", key, *value)]
-        used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         code = self.go_on(name, path, script, lambda file: [*launch, program, "-in", file, *words],
                           environment(max(threads // ranks, 1)), timeout)
         if code != 0:
@@ -91,8 +90,8 @@ class Study:
         resume.merge(path)
         for file in resume.restart_files(path):
             file.unlink()
-        done = {"wanted": wanted, "seconds": round(json.loads(begun.read_text())["seconds"], 2),
-                "processor": round(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used, 2)}
+        spent = json.loads(begun.read_text())
+        done = {"wanted": wanted, "seconds": round(spent["seconds"], 2), "processor": round(spent.get("processor", 0.0), 2)}
         mark.write_text(json.dumps(done))
         return self.read(path, done, grains)
 
@@ -115,23 +114,28 @@ class Study:
         return self.launch(name, path, command("in.saving"), env, timeout, None)
 
     def launch(self, name, path, command, env, timeout, last):
-        """Runs a command and tells its progress; the seconds that it took join those of earlier parts."""
+        """Runs a command and tells its progress; the seconds that it took, also if it is cut, join those of earlier parts."""
         begun, start = path / "begun.json", time.monotonic()
-        before = json.loads(begun.read_text())
+        before, used = json.loads(begun.read_text()), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+
+        def note(processor):
+            begun.write_text(json.dumps({**before, "seconds": before["seconds"] + time.monotonic() - start,
+                                         "processor": before.get("processor", 0.0) + processor}))
+
         with open(path / "screen", "w") as screen:
             process = subprocess.Popen([str(word) for word in command], cwd=path, env=env, stdin=subprocess.DEVNULL, stdout=screen,
                                        stderr=subprocess.STDOUT)
             told = (start, 0.0)
             while process.poll() is None:
                 passed = time.monotonic() - start
-                begun.write_text(json.dumps({**before, "seconds": before["seconds"] + passed}))
+                note(resume.user_time(process.pid))
                 if timeout and passed > timeout:
                     process.kill()
                     process.wait()
                     raise subprocess.TimeoutExpired(command, timeout)
                 told = self.tell_progress(name, path, start, last, told, process)
                 time.sleep(min(1.0, 0.01 + 0.05 * passed))
-        begun.write_text(json.dumps({**before, "seconds": before["seconds"] + time.monotonic() - start}))
+        note(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used)
         return process.returncode
 
     def tell_progress(self, name, path, start, last, told, process):
