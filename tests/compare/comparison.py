@@ -90,8 +90,8 @@ class Scene:
         return 4 * scale * np.mean(self.radius)
 
     def scaled(self, scale):
-        """What goes with the size of the grains: their time step, and the dashpots that keep the fraction of critical damping."""
-        return {"dt": exact_step(scale * self.step), "gamman": f"{4000 / scale:.6g}"}
+        """What goes with the size of the grains: their time step, the dashpots that keep the fraction of critical damping, conductivity."""
+        return {"dt": exact_step(scale * self.step), "gamman": f"{4000 / scale:.6g}", "scale": f"{scale:.10g}"}
 
     def pack(self, study, name, grains, seed, scale):
         return study.pack(f"{name}_{grains}_{seed}", threads=1, radius=tuple(scale * r for r in self.radius), grains=grains, seed=seed,
@@ -183,7 +183,8 @@ class Comparison(Study):
         for side in [*levels, *coarse]:
             print(f"  {self.case}: {side.label}: {side.seconds:.1f} s, " +
                   ", ".join(f"{q} {self.error(side, reference, q):.3g}" for q in quantities), flush=True)
-        print(f"  {self.case}: {reference.label}: {reference.seconds:.1f} s, spread " + ", ".join(f"{q} {spread[q]:.3g}" for q in quantities))
+        print(f"  {self.case}: {reference.label}: {reference.seconds:.1f} s, spread " +
+              ", ".join(f"{q} {spread[q]:.3g}" for q in quantities if spread[q] is not None))
         self.cost_figure(reference, levels, coarse, quantities)
 
     @staticmethod

@@ -17,8 +17,8 @@ def compare(study):
     spare = lambda scale: scene.area((LENGTH, LENGTH), scale)  # `total` grains are a square metre
     cut = scene.block((LENGTH, 0), 0, (-0.2, 1.2, 0.0, None), 2)
     sizes = {"full": (scene.total, 3, 3, LEVELS, 0.6),
-             "quick": (1000, 2, 1, LEVELS[:1], 0.2),
-             "tiny": (250, 1, 1, [(COARSE, 16)], 0.05)}
+             "quick": (1000, 2, 1, LEVELS[:1], 0.6),
+             "tiny": (250, 1, 1, [(COARSE, 16)], 0.3)}
     total, seeds, replicates, levels, t_run = sizes[study.size]
     times = {"t_run": t_run, "every": max(0.01, round(t_run / 6, 2))}
     fulls, sides = study.run_both(scene, total, seeds, replicates, levels, times, spare, cut)

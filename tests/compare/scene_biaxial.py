@@ -77,9 +77,10 @@ def draw(study, full, best):
 
 
 def pictures(study, full, best):
-    """Heating of the last moment: two full DEMs of other seeds, and the multiscale answer."""
-    figure, axes = plt.subplots(1, 3, figsize=(10.5, 4.2), layout="constrained", sharey=True)
-    shown = [(full.runs[0], "full_dem", full.label), (full.runs[-1], "full_dem", "another seed"), (best.runs[0], "multiscale", best.label)]
+    """Heating of the last moment: full DEMs of two seeds, if there are two, and the multiscale answer."""
+    shown = [(full.runs[0], "full_dem", full.label), (full.runs[-1], "full_dem", "another seed")][:len(full.runs)]
+    shown.append((best.runs[0], "multiscale", best.label))
+    figure, axes = plt.subplots(1, len(shown), figsize=(3.5 * len(shown), 4.2), layout="constrained", sharey=True)
     top = None
     for axis, (run, name, title) in zip(axes, shown):
         last = arrays(run.dump(f"out/{name}.dump")[-1])

@@ -22,7 +22,7 @@ def compare(study, case="dry"):
     scene = Scene("compare/column", (0.0032, 0.0064), 10800, 1.7e-5, answer=answer,
                   settings=dict(pressure=1e4, preparation_friction=0.5, density=DENSITY, kn=1e7, kt=1e7, thickness=1))
     sizes = {"full": (scene.total, 3, 2, LEVELS + FOUR[case], 0.8),
-             "quick": (1000, 2, 1, [(SIZES[0], 36)], 0.4),
+             "quick": (1000, 2, 1, [(SIZES[0], 36)], 0.8),
              "tiny": (250, 1, 1, [(SIZES[0], 16)], 0.1)}
     total, seeds, replicates, levels, t_run = sizes[study.size]
     like = scene.pack(study, "rve", 100, 1, scene.scale(total))
