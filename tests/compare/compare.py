@@ -5,21 +5,17 @@
    compare.py [--quick] [case ...]        from the root (make compare; QUICK=1: few grains, to try it)
 
 Writes build/compare (build/compare-quick): report.json, coarse_dem.json, report.md, figures. A finished run is not repeated."""
-import argparse
-import importlib
 import json
 import pathlib
 import sys
-import time
-import traceback
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from comparison import Comparison  # noqa: E402
-from study import BUILD  # noqa: E402
-from verify import processor  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
-CASES = [name for name in ("bed", "biaxial", "column", "melting_column") if (HERE / f"scene_{name}.py").exists()]
+sys.path.insert(0, str(HERE))
+from comparison import Comparison  # noqa: E402
+from command import parse, present, processor, run_cases  # noqa: E402
+from study import BUILD  # noqa: E402
+
+CASES = present(HERE, "scene", ("bed", "biaxial", "column", "melting_column"))
 
 
 def write_report(folder, comparisons, seconds, quick):
@@ -36,27 +32,11 @@ def write_report(folder, comparisons, seconds, quick):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("cases", nargs="*", metavar="case", help=", ".join(CASES))
-    arguments = parser.parse_args()
-    unknown = set(arguments.cases) - set(CASES)
-    if unknown:
-        parser.error(f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(CASES)}")
-    folder = BUILD / ("compare-quick" if arguments.quick else "compare")
-    start, failed, comparisons = time.monotonic(), [], []
-    for name in arguments.cases or CASES:
-        print(name, flush=True)
-        comparison = Comparison(name, folder, "quick" if arguments.quick else "full")
-        comparisons.append(comparison)
-        try:
-            importlib.import_module(f"scene_{name}").compare(comparison)
-        except Exception:  # one case that breaks must not take the others' results along
-            traceback.print_exc()
-            comparison.note(f"did not end: {traceback.format_exc().strip().splitlines()[-1]}")
-            failed.append(name)
-        write_report(folder, comparisons, time.monotonic() - start, arguments.quick)
-    print(f"{folder / 'report.md'}: {sum(len(c.rows) for c in comparisons)} figures, {time.monotonic() - start:.0f} s")
+    names, quick = parse(__doc__, CASES, "quick")
+    folder = BUILD / ("compare-quick" if quick else "compare")
+    comparisons, failed, seconds = run_cases("scene", "compare", names, lambda name: Comparison(name, folder, "quick" if quick else "full"),
+                                             lambda studies, passed: write_report(folder, studies, passed, quick))
+    print(f"{folder / 'report.md'}: {sum(len(c.rows) for c in comparisons)} figures, {seconds:.0f} s")
     return 1 if failed else 0
 
 

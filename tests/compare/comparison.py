@@ -13,8 +13,10 @@ from PIL import Image
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "verify"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent.parent / "examples" / "compare"))
+from cut import cut_block, read_packing, write_data, write_groups  # noqa: E402
 from study import Study, plt  # noqa: E402
 
+DENSITY = 2650  # of the grains' matter, in all cases
 BLUE, RED, GREY = "C0", "C3", "0.5"
 
 
@@ -83,13 +85,32 @@ class Scene:
     def scale(self, total):
         return np.sqrt(self.total / total)
 
+    def slab(self, scale):
+        """Thickness of a rough wall of grains."""
+        return 4 * scale * np.mean(self.radius)
+
     def scaled(self, scale):
-        """What goes with the size of the grains: their time step, and the dashpots that keep the fraction of critical damping."""
-        return {"dt": exact_step(scale * self.step), "gamman": f"{4000 / scale:.6g}"}
+        """What goes with the size of the grains: their time step, the dashpots that keep the fraction of critical damping, conductivity."""
+        return {"dt": exact_step(scale * self.step), "gamman": f"{4000 / scale:.6g}", "scale": f"{scale:.10g}"}
 
     def pack(self, study, name, grains, seed, scale):
         return study.pack(f"{name}_{grains}_{seed}", threads=1, radius=tuple(scale * r for r in self.radius), grains=grains, seed=seed,
                           **self.settings)
+
+    def area(self, size, scale):
+        """Of a packing, which is square, with room for a block and two slabs; the fewer its grains, the more its size scatters."""
+        return ((1 + 0.02 * scale) * max(size) + 2 * self.slab(scale)) ** 2
+
+    def block(self, size, axis, box, types):
+        """How a block between rough slabs is cut, for full_dem(): see cut_block. None in `box`: the packing's own period along y."""
+        def cut(packing, stem, scale):
+            files = {kind: stem.with_suffix(f".{kind}") for kind in ("data", "groups")}
+            grains = cut_block(packing, size, self.slab(scale), axis)
+            period = read_packing(packing)[2][1]
+            write_data(files["data"], grains, [period if edge is None else edge for edge in box], DENSITY, types)
+            write_groups(files["groups"], grains[3])
+            return files
+        return cut
 
     def full_dem(self, study, total, seeds, variables, spare, cut):
         """`spare`(scale) times `total` grains are packed; cut(packing, stem, scale) makes ({variable: file})."""
@@ -108,10 +129,12 @@ class Scene:
         for k in range(replicates):
             packings = [self.pack(study, "rve", grains, 4 * k + seed, scale) for seed in range(1, 5)]
             words = {**variables, **size, "packing": [p.name for p in packings], **self.scaled(scale)}
-            name = "_".join(["multiscale", *(f"{value:g}" for value in size.values()), str(grains), str(k)])
+            name = "_".join(["multiscale", *(v if isinstance(v, str) else f"{v:g}" for v in size.values()), str(grains), str(k)])
             runs.append(study.run(name, "in.multiscale", words, [self.folder], packings, grains=grains, threads=1))
-        points = runs[0].points
-        return Side(f"multiscale, {points} x {grains}", runs, [self.answer(run, "multiscale") for run in runs], points * grains)
+        points, per_cell = runs[0].points, round(size["grid"] / size.get("spacing", size["grid"])) ** 2
+        label = f"multiscale, {points} x {grains}" + (f", {per_cell} per cell" if per_cell > 1 else "")
+        label += f", {size['shape']}" if "shape" in size else ""
+        return Side(label, runs, [self.answer(run, "multiscale") for run in runs], points * grains)
 
 
 class Comparison(Study):
@@ -133,6 +156,13 @@ class Comparison(Study):
         """Grains of the full DEMs: the reference, and such with fewer, larger grains."""
         return [total, total // 4, total // 10, total // 30] if self.full else [total]
 
+    def run_both(self, scene, total, seeds, replicates, levels, variables, spare, cut):
+        """(full DEMs, that of all grains first; multiscale sizes in the order of `levels`), compared."""
+        fulls = [scene.full_dem(self, n, seeds, variables, spare, cut) for n in self.sizes(total)]
+        sides = [scene.multiscale(self, size, grains, scene.scale(total), replicates, variables) for size, grains in levels]
+        self.compare(fulls[0], sides, fulls[1:])
+        return fulls, sides
+
     def compare(self, reference, levels, coarse):
         """Errors of every multiscale size and of full DEMs of fewer, larger grains."""
         quantities = list(reference.answers[0])
@@ -153,7 +183,8 @@ class Comparison(Study):
         for side in [*levels, *coarse]:
             print(f"  {self.case}: {side.label}: {side.seconds:.1f} s, " +
                   ", ".join(f"{q} {self.error(side, reference, q):.3g}" for q in quantities), flush=True)
-        print(f"  {self.case}: {reference.label}: {reference.seconds:.1f} s, spread " + ", ".join(f"{q} {spread[q]:.3g}" for q in quantities))
+        print(f"  {self.case}: {reference.label}: {reference.seconds:.1f} s, spread " +
+              ", ".join(f"{q} {spread[q]:.3g}" for q in quantities if spread[q] is not None))
         self.cost_figure(reference, levels, coarse, quantities)
 
     @staticmethod

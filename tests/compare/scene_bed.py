@@ -2,10 +2,9 @@
 """(a) Heat conduction through a compressed bed between held walls; heated grains press."""
 import numpy as np
 
-from comparison import BLUE, RED, Scene, arrays, curve_band, lagrangian, plt
-from cut import cut_block, read_packing, write_data, write_groups
+from comparison import BLUE, DENSITY, RED, Scene, arrays, curve_band, lagrangian, plt
 
-LENGTH, DENSITY = 1.0, 2650
+LENGTH = 1.0
 LINES = np.arange(0, LENGTH + 1e-9, 0.125), np.array([-9.0, 9.0])  # profiles are compared on slices
 # edge of the grid's cells, of a point each, step of the points; grains of a packing
 COARSE, FINE = dict(grid=0.125, step=5e-4), dict(grid=0.0625, step=2.5e-4)
@@ -15,24 +14,14 @@ LEVELS = [(COARSE, 36), (COARSE, 100), (FINE, 100), (FINE, 400)]
 def compare(study):
     scene = Scene("compare/bed", (0.0034, 0.0068), 10000, 1.8e-5, answer=answer,
                   settings=dict(pressure=5e4, preparation_friction=0.01, density=DENSITY, kn=1e7, kt=1e7, thickness=1))
-    slab = lambda scale: 4 * scale * np.mean(scene.radius)
-    spare = lambda scale: (1.02 * LENGTH + 2 * slab(scale)) ** 2  # packings are square; `total` grains are a square metre
-
-    def cut(packing, stem, scale):
-        files = {kind: stem.with_suffix(f".{kind}") for kind in ("data", "groups")}
-        grains = cut_block(packing, (LENGTH, 0), slab(scale), 0)
-        write_data(files["data"], grains, (-0.2, 1.2, 0.0, read_packing(packing)[2][1]), DENSITY, 2)
-        write_groups(files["groups"], grains[3])
-        return files
-
+    spare = lambda scale: scene.area((LENGTH, LENGTH), scale)  # `total` grains are a square metre
+    cut = scene.block((LENGTH, 0), 0, (-0.2, 1.2, 0.0, None), 2)
     sizes = {"full": (scene.total, 3, 3, LEVELS, 0.6),
-             "quick": (1000, 2, 1, LEVELS[:1], 0.2),
-             "tiny": (250, 1, 1, [(COARSE, 16)], 0.05)}
+             "quick": (1000, 2, 1, LEVELS[:1], 0.6),
+             "tiny": (250, 1, 1, [(COARSE, 16)], 0.3)}
     total, seeds, replicates, levels, t_run = sizes[study.size]
     times = {"t_run": t_run, "every": max(0.01, round(t_run / 6, 2))}
-    fulls = [scene.full_dem(study, n, seeds, times, spare, cut) for n in study.sizes(total)]
-    sides = [scene.multiscale(study, size, grains, scene.scale(total), replicates, times) for size, grains in levels]
-    study.compare(fulls[0], sides, fulls[1:])
+    fulls, sides = study.run_both(scene, total, seeds, replicates, levels, times, spare, cut)
     if study.size != "tiny":
         draw(study, fulls[0], sides[-1])
 

@@ -2,24 +2,28 @@
 """(c) A dry column collapses; (d) so does one whose bonds melt (scene_melting_column)."""
 import numpy as np
 
-from comparison import BLUE, RED, Scene, arrays, curve_band, plt, smear
+from comparison import BLUE, DENSITY, RED, Scene, arrays, curve_band, plt, smear
 from cut import cut_column, write_data
 
-WIDTH, DENSITY, BOX = 1.0, 2650, (-0.2, 4.0, -0.2, 1.6)
+WIDTH, BOX = 1.0, (-0.2, 4.0, -0.2, 1.6)
 CELL = 0.125  # of the grid on which fields are compared
 LINES = np.arange(0, 4.0 + 1e-9, CELL), np.arange(0, 1.25 + 1e-9, CELL)
-# edge of a point, of the grid's cells, step of the points; grains of a packing
-COARSE, FINE = dict(spacing=1 / 8, grid=1 / 4, step=5e-4), dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4)
-FINEST = dict(spacing=1 / 24, grid=1 / 12, step=1 / 6000)
-LEVELS = [(COARSE, 100), (FINE, 36), (FINE, 100), (FINEST, 100)]
+# edge of a point and of its cell of the grid, step of the points; grains of a packing
+SIZES = [dict(spacing=1 / n, grid=1 / n, step=2e-3 / n) for n in (8, 12, 16, 24)]
+LEVELS = [(SIZES[0], 100), (SIZES[1], 36), (SIZES[2], 36), (SIZES[2], 100), (SIZES[3], 36)]
+# Four points in a cell, to see what that changes.
+FOUR = {"dry": [(dict(spacing=1 / 8, grid=1 / 4, step=5e-4), 100), (dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 36),
+                (dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 100), (dict(spacing=1 / 24, grid=1 / 12, step=1 / 6000), 100)],
+        "melting": [(dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 36)]}
+BEST = 4  # which of the levels the figures show
 
 
 def compare(study, case="dry"):
     scene = Scene("compare/column", (0.0032, 0.0064), 10800, 1.7e-5, answer=answer,
                   settings=dict(pressure=1e4, preparation_friction=0.5, density=DENSITY, kn=1e7, kt=1e7, thickness=1))
-    sizes = {"full": (scene.total, 3, 2, LEVELS, 0.8),
-             "quick": (1000, 2, 1, [(COARSE, 36)], 0.4),
-             "tiny": (250, 1, 1, [(COARSE, 16)], 0.1)}
+    sizes = {"full": (scene.total, 3, 2, LEVELS + FOUR[case], 0.8),
+             "quick": (1000, 2, 1, [(SIZES[0], 36)], 0.8),
+             "tiny": (250, 1, 1, [(SIZES[0], 16)], 0.1)}
     total, seeds, replicates, levels, t_run = sizes[study.size]
     like = scene.pack(study, "rve", 100, 1, scene.scale(total))
     spare = lambda scale: (1 + 12 * scale * np.mean(scene.radius)) ** 2  # gaps at the plates, the floor
@@ -29,13 +33,12 @@ def compare(study, case="dry"):
         return {"data": stem.with_suffix(".data")}
 
     times = {"case": case, "t_run": t_run, "every": max(0.01, round(t_run / 16, 2))}
-    fulls = [scene.full_dem(study, n, seeds, times, spare, cut) for n in study.sizes(total)]
-    sides = [scene.multiscale(study, size, grains, scene.scale(total), replicates, times) for size, grains in levels]
-    study.compare(fulls[0], sides, fulls[1:])
+    fulls, sides = study.run_both(scene, total, seeds, replicates, levels, times, spare, cut)
     if study.size != "tiny":
         tell_of_segregation(study, fulls[0])
-        draw(study, fulls[0], sides[-1], case)
-        pictures(study, fulls[0], sides[-1], case)
+        best = sides[min(BEST, len(sides) - 1)]
+        draw(study, fulls[0], best, case)
+        pictures(study, fulls[0], best, case)
 
 
 def answer(run, side):
