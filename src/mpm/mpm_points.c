@@ -142,7 +142,8 @@ static const char *find_argument_fault(const Mpm *mpm, const MpmPoint *point) {
   for (int i = 0; i < mpm->scene.dimension; i++)
     if (mpm->scene.shape == MPM_SHAPE_GIMP &&
         !(point->size0[i] > 0.0 && point->size0[i] * mpm->per_length[1 + i] <= 1.0 + 1e-9))
-      return "size0 must be > 0 and at most the grid's spacing (uGIMP)";
+      return "size0 must be > 0 and at most the grid's spacing, also when that has shrunk with followed walls (uGIMP; bspline "
+             "has no such limit)";
   return NULL;
 }
 
