@@ -44,11 +44,16 @@ static int pairs_for(const RveRecord *record) {
   return need > slots ? need : slots;
 }
 
+/* Two packings that fit a core's own cache (L2, 1 MB and more) with room to spare; larger ones would drive each other out. */
+enum { AHEAD_MOST = 512 << 10 };
+
 /* Runs a call on the host; grows the arena as often as a list needs it. */
 static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const RveCall *call, RveWorkspace *workspace) {
   for (;;) {
     RveScratch scratch;
     TRY(reserve(workspace, &record->counts, pairs_for(record), &scratch));
+    if (workspace->ahead && workspace->ahead->bytes + record->bytes <= AHEAD_MOST)
+      scratch.ahead = workspace->ahead->arena, scratch.ahead_bytes = workspace->ahead->bytes;
     const int outcome = batch->kernels->run(batch->features, call, record->arena, &record->counts, &scratch);
     if (outcome != RVE_TOO_SMALL) return BASE_OK;
     TRY(rve_record_grow(record));
@@ -336,6 +341,13 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
   return BASE_OK;
 }
 
+/* Threads take the RVEs in turns, more or less. */
+static const RveRecord *ahead_of(const RveBatch *batch, int n, int k) {
+  const int next = k + omp_get_num_threads();
+  if (next >= n || batch->twin[next].leader != batch->twin[next].rve) return NULL;
+  return &batch->record[batch->twin[next].rve];
+}
+
 /* Steps the first of each set of twins, then copies it. A twin of one that failed fails by itself. */
 static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
   BaseStatus first = BASE_OK;
@@ -353,7 +365,10 @@ static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveI
         status = rve_twins_copy(batch, twin->leader, twin->rve);
         copied++;
       } else {
-        status = step_record(batch, twin->rve, twin->input, duration, &batch->workspace[omp_get_thread_num()]);
+        RveWorkspace *workspace = &batch->workspace[omp_get_thread_num()];
+        workspace->ahead = ahead_of(batch, n, k);
+        status = step_record(batch, twin->rve, twin->input, duration, workspace);
+        workspace->ahead = NULL;
         flown += batch->record[twin->rve].last.flew;
       }
       if (status != BASE_OK) {

@@ -13,6 +13,7 @@ typedef struct RveWorkspace { /* one thread's */
   RveRecord before; /* the RVE as it was before the call, if kept = 1; its arena has room for `room` bytes */
   size_t room;
   int kept;
+  const RveRecord *ahead; /* what this thread probably runs next, or NULL */
   RveConductionWork conduction;
 } RveWorkspace;
 

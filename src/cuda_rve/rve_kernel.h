@@ -298,16 +298,40 @@ RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveH
   }
 }
 
+/* In coupled runs a packing comes from memory for a few steps at a time. Fetched while the thread works on another it need
+ * not be waited for, if only few lines are asked for at once. */
+enum { RVE_LINE = 64 };
+RVE_FN void rve_spread_ahead(RveScratch *s, int64_t blocks) {
+#if defined(__CUDACC__)
+  (void)s, (void)blocks;
+#else
+  const int64_t lines = (int64_t)(s->ahead_bytes / RVE_LINE);
+  s->ahead_lines = s->ahead && blocks > 0 ? (int32_t)((lines + blocks - 1) / blocks) : 0;
+#endif
+}
+RVE_FN void rve_fetch_ahead(RveScratch *s) {
+#if defined(__CUDACC__)
+  (void)s;
+#else
+  if (__builtin_expect(s->ahead_lines == 0, 1)) return;
+  const size_t part = (size_t)s->ahead_lines * RVE_LINE, many = part < s->ahead_bytes ? part : s->ahead_bytes;
+  for (size_t at = 0; at < many; at += RVE_LINE) __builtin_prefetch(s->ahead + at, 0, 2);
+  s->ahead += many, s->ahead_bytes -= many;
+  if (s->ahead_bytes == 0) s->ahead_lines = 0;
+#endif
+}
+
 /* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
  */
 RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
-                             const RveCounts *n, const RveArrays *a, rve_real *slip, rve_real *loss) {
+                             const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
   const RveContactPass c = rve_contact_pass_of(call, head, dt);
   RveContactSums sum;
   sum.slid = sum.lost = near_set(0.0);
   for (int block = team->pack; block < n->blocks; block += team->packs) {
     const int lane0 = block * RVE_PACK;
     const RveNearBody own = near_own_body(ft, a, lane0);
+    rve_fetch_ahead(s);
     for (int k = 0; k < 3; k++) sum.force[k] = sum.torque[k] = near_set(0.0);
     if (RVE_CHUNK > 1 && ft.dimension == 3) rve_contact_chunks(ft, &c, head, n, a, block, &sum);
     else rve_contact_rows(ft, &c, head, n, a, block, &own, &sum);

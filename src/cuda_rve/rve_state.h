@@ -125,6 +125,10 @@ typedef struct RveScratch {
   int32_t *out_rows, *in_rows;                    /* [N + 2] a block's rows of near pairs */
   double *sorted[4]; /* [2 N + 64] fractional coordinates and radius, sorted along the first */
   double *swap;      /* [N] */
+  /* The arena that this thread works on next, which it fetches into its cache a few lines at a time; NULL: none */
+  const char *ahead;
+  size_t ahead_bytes;
+  int32_t ahead_lines; /* for each block of grains */
 } RveScratch;
 
 RVE_ANY void *rve_carve(void *base, size_t *used, size_t bytes) {
@@ -183,6 +187,7 @@ RVE_ANY size_t rve_scratch_layout(const RveCounts *n, int32_t pairs, void *base,
   for (int k = 0; k < 11; k++) *per_grain[k] = (int32_t *)rve_carve(base, &used, (grains + 2) * 4);
   for (int k = 0; k < 4; k++) s->sorted[k] = (double *)rve_carve(base, &used, (2 * grains + 64) * 8);
   s->swap = (double *)rve_carve(base, &used, grains * 8);
+  s->ahead = NULL, s->ahead_bytes = 0, s->ahead_lines = 0;
   return used;
 }
 

@@ -89,6 +89,7 @@ RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *ca
   rve_real slip = rve_set(0.0), dash = rve_set(0.0), damping = rve_set(0.0);
   RveOutcome outcome = RVE_DONE;
   int resumed = head->list_due || call->steps == 0;
+  rve_spread_ahead(s, (call->steps - done0) * n->blocks);
   rve_sync();
   const int flew = rve_fly(ft, team, call, head, rve_radius_factor(call, call->temperature), n, a);
   rve_sync();
@@ -114,7 +115,7 @@ RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *ca
     if (head->failed) outcome = RVE_UNSTABLE;
     else if (head->list_due) outcome = rve_renew_list(ft, team, call, head, n, a, s);
     if (outcome != RVE_DONE) break;
-    rve_contact_pass(ft, team, call, head, dt, n, a, &slip, &dash);
+    rve_contact_pass(ft, team, call, head, dt, n, a, s, &slip, &dash);
     rve_sync();
   }
   const double kt = call->tangential_stiffness;
