@@ -272,3 +272,23 @@ def test_the_silo_example_runs(size, points, dempm, tmp_path):
         assert table["above"][-1] == 1.0
         heat[case] = table["mpm[9]"][-1]
     assert heat["forced"] > 2 * heat["free"] > 0.0
+
+
+def test_the_silo_in_3d_opens_its_gate(dempm, tmp_path):
+    """examples/silo_3d, few points: all stay above the gate until LIGGGHTS moves it, then they leave through the outlet alone."""
+    example = ROOT / "examples" / "silo_3d"
+    for mesh in example.glob("*.stl"):
+        shutil.copy(mesh, tmp_path)
+    (tmp_path / "out").mkdir()
+    make_spheres(tmp_path / "spheres.data")
+    variables = {"packing": "spheres.data", "spacing": 0.05, "settle": 600, "flow": 1000, "frame": 100}
+    run = dempm(example / "in.silo_3d", cwd=tmp_path, variables=variables)
+    frames = run.dump("out/points.txt")
+    below = []
+    for step, points in frames:
+        below.append(sum(z < 0.1 for z in points["z"]))
+        for x, y, z in zip(points["x"], points["y"], points["z"]):
+            assert z < 0.1 or max(abs(x), abs(y)) < min(0.25, z), f"step {step}: a point went through a wall"
+        assert step > 600 or below[-1] == 0
+    print(f"{below[-1]} of {len(points['z'])} points have left at the end")
+    assert 0 < below[-1] < len(points["z"])
