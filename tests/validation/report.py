@@ -24,7 +24,7 @@ class Report:
     def __init__(self, case):
         self.case, self.rows = case, []
 
-    def check(self, quantity, error, bound, *, seconds=None):
+    def check(self, quantity, error, bound, seconds=None):
         """error <= bound passes; bound None: for information."""
         error = float(error)
         passes = None if bound is None else bool(error <= bound)
