@@ -342,10 +342,9 @@ static BaseStatus device_step(RveBatch *batch, int n, const int *index, const Rv
 }
 
 /* Threads take the RVEs in turns, more or less. */
-static const RveRecord *ahead_of(const RveBatch *batch, int n, int k) {
+static const RveTwin *ahead_of(const RveBatch *batch, int n, int k) {
   const int next = k + omp_get_num_threads();
-  if (next >= n || batch->twin[next].leader != batch->twin[next].rve) return NULL;
-  return &batch->record[batch->twin[next].rve];
+  return next < n && batch->twin[next].leader == batch->twin[next].rve ? &batch->twin[next] : NULL;
 }
 
 /* Steps the first of each set of twins, then copies it. A twin of one that failed fails by itself. */

@@ -13,7 +13,7 @@ typedef struct RveWorkspace { /* one thread's */
   RveRecord before; /* the RVE as it was before the call, if kept = 1; its arena has room for `room` bytes */
   size_t room;
   int kept;
-  const RveRecord *ahead; /* what this thread probably runs next, or NULL */
+  const struct RveTwin *ahead; /* what this thread probably runs next, or NULL */
   RveConductionWork conduction;
 } RveWorkspace;
 
@@ -31,7 +31,9 @@ typedef struct RveFailed {
 typedef struct RveTwin {
   uint64_t history;
   const RveInput *input;
-  int rve, leader; /* leader: the first of its kind */
+  int rve, leader;   /* leader: the first of its kind */
+  const char *arena; /* its state as the call begins, of `bytes`: to be fetched into the cache only, as the thread that */
+  size_t bytes;      /* runs it may replace the arena meanwhile */
 } RveTwin;
 
 struct RveBatch {

@@ -18,7 +18,8 @@ void rve_twins_sort(RveBatch *batch, int n, const int *index, const RveInput *in
   RveTwin *twin = batch->twin;
   for (int k = 0; k < n; k++) {
     const int rve = index ? index[k] : k;
-    twin[k] = (RveTwin){batch->history[rve], &input[k], rve, rve};
+    const RveRecord *record = &batch->record[rve];
+    twin[k] = (RveTwin){batch->history[rve], &input[k], rve, rve, (const char *)record->arena, record->bytes};
   }
   qsort(twin, (size_t)n, sizeof *twin, compare);
   for (int k = 1; k < n && batch->scene.share; k++)

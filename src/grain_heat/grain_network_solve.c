@@ -161,10 +161,9 @@ BaseStatus grain_network_solve(GrainNetwork *n, const GrainRanks *ranks, double 
     if (!solved || !n->varies) {
       warm(&s, 1.0), renewals++;
       break;
-    } else {
-      square = correct(&s, before), falls = square < before;
-      s.most_through = fmax(s.most_through, s.through);
     }
+    square = correct(&s, before), falls = square < before;
+    s.most_through = fmax(s.most_through, s.through);
   }
   return report(&s, square, solved, renewals, solution);
 }
