@@ -167,7 +167,7 @@ run-fuzzers: $(FUZZERS)
 	$(foreach f,$(FUZZERS),DEMPM_TEST_DATA=tests/data $(f) &&) true
 bench: programs $(BENCHES) $(BUILD)/peers
 	$(BUILD)/bench/bench_rve cpu
-	$(BUILD)/bench/bench_mpm cpu $(BUILD)/bench/mpm.json $(ROUNDS)
+	OMP_PROC_BIND=true $(BUILD)/bench/bench_mpm cpu $(BUILD)/bench/mpm.json $(ROUNDS)
 	$(PYTHON) tests/bench/rve.py $(BUILD) --rounds $(ROUNDS)
 bench-gpu: programs $(BENCHES)
 	$(BUILD)/bench/bench_rve cuda
