@@ -12,6 +12,7 @@ from study import BUILD, plt
 from conftest import environment
 from exact import square_centre_stress, square_mean_temperature, square_temperature
 
+PACKING = dict(grains=400, radius=(0.0025, 0.005), pressure=1e5, preparation_friction=0.01, density=2650, kn=1e6, kt=1e6, thickness=0.075)
 EXPANSION, PIPE, HOT = 1e-4, 2.05e4, 75.0
 GRAINS = ["density=2650", "kn=1e6", "kt=1e6", "mu=0.5", "thickness=0.075", "damping/local=0.7",
           f"expansion={EXPANSION}", "Tref=0", f"alpha={PIPE}"]
@@ -23,12 +24,6 @@ def program(study, name, *words):
                           capture_output=True)
     if done.returncode:
         raise RuntimeError(f"{name}: {done.stdout}{done.stderr}")
-
-
-def make_packing(study):
-    program(study, "dempm-pack", "generate", "dense.packing", "grains", 400, "radius", 0.0025, 0.005, "pressure", 1e5,
-            "preparation_friction", 0.01, "density", 2650, "kn", 1e6, "kt", 1e6, "thickness", 0.075)
-    return study.folder / "dense.packing"
 
 
 def element(study, name, rows):
@@ -133,7 +128,7 @@ def friction_heat(study):
 
 
 def verify(study):
-    make_packing(study)
+    study.pack("dense", **PACKING)
     probes = {(axis, heat): probe(study, axis, heat) for axis in "xy" for heat in (0.0, HOT)}
     for (axis, heat), (bulk, shear) in probes.items():
         study.note(f"probed along {axis} at {heat:g} C: K {bulk / 1e6:.2f} MPa, G {shear / 1e6:.2f} MPa "

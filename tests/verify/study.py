@@ -25,6 +25,7 @@ import resume  # noqa: E402
 from conftest import BUILD, ROOT, environment, parse_dump, parse_thermo  # noqa: E402
 
 EXAMPLES = ROOT / "examples"
+PACKINGS = pathlib.Path(__file__).resolve().parent / "packings"
 THREADS = len(os.sched_getaffinity(0))
 
 
@@ -185,12 +186,15 @@ class Study:
         self.figures.append(path.name)
 
     def pack(self, name, threads=THREADS, **settings):
-        """A packing by dempm-pack, made once; its path."""
+        """A packing by dempm-pack, made once; its path. Those of the folder packings/ are inputs that stay the same."""
         path = self.folder / f"{name}.packing"
-        words = [word for key, value in settings.items() for word in (key, *(value if isinstance(value, tuple) else (value,)))]
+        words = [str(w) for key, value in settings.items() for w in (key, *(value if isinstance(value, tuple) else (value,)))]
+        kept = json.loads((PACKINGS / "made.json").read_text()).get(f"{self.case}_{name}.packing")
+        if kept == words:
+            return pathlib.Path(shutil.copyfile(PACKINGS / f"{self.case}_{name}.packing", path))
         mark = path.with_suffix(".made")
         if not (path.exists() and mark.exists() and mark.read_text() == str(words)):
-            subprocess.run([str(w) for w in (BUILD / "dempm-pack", "generate", path, *words)], check=True, stdout=subprocess.PIPE,
+            subprocess.run([str(BUILD / "dempm-pack"), "generate", str(path), *words], check=True, stdout=subprocess.PIPE,
                            env=environment(threads))
             mark.write_text(str(words))
         return path
