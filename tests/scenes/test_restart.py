@@ -64,7 +64,7 @@ def test_setup_does_not_disturb_the_way(dempm, tmp_path):
 
 
 def test_restart_before_any_run_is_the_start(dempm, tmp_path):
-    tail = ELASTIC.format(transfer="flip 0.99", extra=extra) + THERMO + state_dump(200)
+    tail = ELASTIC.format(transfer="flip 0.99", extra="") + THERMO + state_dump(200)
     first = BOX.format(boundary="f f") + POINTS + tail + "write_restart begin\nrun 200\n"
     through = dempm(first, cwd=tmp_path)
     expected = state(through, 200)
