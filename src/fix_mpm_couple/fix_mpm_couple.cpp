@@ -69,7 +69,7 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
       lmp, this, narg, arg, 3,
       {"grid", "origin", "shape", "transfer", "order", "material", "thermal", "temperature", "mechanics",
        "damping/point", "damping/grid", "point/size", "density/bulk", "timestep/check", "leaving", "threads", "follow",
-       "thermal/every"});
+       "thermal/every", "volumetric"});
   while (parser.next()) {
     if (parser.is("grid")) scene_.spacing = parser.number(NumberRange::positive());
     else if (parser.is("origin"))
@@ -80,6 +80,8 @@ void FixMPMCouple::read_keywords(int narg, char **arg) {
     else if (parser.is("transfer")) read_transfer(parser);
     else if (parser.is("order"))
       scene_.order = (MpmOrder[]){MPM_ORDER_USF, MPM_ORDER_USL, MPM_ORDER_MUSL}[parser.choice({"usf", "usl", "musl"})];
+    else if (parser.is("volumetric"))
+      scene_.volumetric = (MpmVolumetric[]){MPM_VOLUMETRIC_POINT, MPM_VOLUMETRIC_CELL}[parser.choice({"point", "cell"})];
     else if (parser.is("material")) read_material(parser);
     else if (parser.is("thermal")) scene_.thermal = parser.yes_no();
     else if (parser.is("thermal/every")) read_thermal_every(parser);
@@ -114,6 +116,9 @@ void FixMPMCouple::check_keywords(const KeywordParser &parser) {
   if (parser.given("thermal/every") && !(scene_.thermal && scene_.mechanical))
     parser.fail("keyword 'thermal/every' needs 'thermal yes' and 'mechanics yes'; with 'mechanics no' the time step is the "
                 "thermal one");
+  if (scene_.volumetric == MPM_VOLUMETRIC_CELL && rve_id_.empty() && elastic_mode_ == MPM_ELASTIC_BAR)
+    parser.fail("keyword 'volumetric': 'cell' has no meaning with 'material elastic bar', whose stress has one direction; allowed: "
+                "'point'");
   if (given_density_ > 0.0 && rve_id_.empty())
     parser.fail("keyword 'density/bulk' needs 'material rve'; with 'material elastic': set group GROUP density RHO");
   if (!parser.given("threads")) {

@@ -19,6 +19,8 @@ typedef enum MpmShape { MPM_SHAPE_LINEAR, MPM_SHAPE_GIMP, MPM_SHAPE_BSPLINE } Mp
 /* FLIP blends PIC by pic_fraction. */
 typedef enum MpmTransfer { MPM_TRANSFER_FLIP, MPM_TRANSFER_APIC, MPM_TRANSFER_XPIC } MpmTransfer;
 typedef enum MpmOrder { MPM_ORDER_USF, MPM_ORDER_USL, MPM_ORDER_MUSL } MpmOrder;
+/* Whose volumetric strain rate the law sees: the point's own, or the mean over the points of its cell. */
+typedef enum MpmVolumetric { MPM_VOLUMETRIC_POINT, MPM_VOLUMETRIC_CELL } MpmVolumetric;
 
 typedef struct MpmScene {
   int dimension;          /* 2 or 3 */
@@ -38,6 +40,7 @@ typedef struct MpmScene {
   double mass_cutoff;     /* nodes below this fraction of their largest point's mass move with the points' field but
                            * carry no force; default 1e-30 */
   int threads;            /* 0 = OpenMP's own choice */
+  MpmVolumetric volumetric; /* default POINT; CELL against volumetric locking (mpm_volumetric.c) */
   int gimp_stretch; /* 1: the domains of uGIMP follow the points' stretch, at most a cell wide; default 0, undeformed */
 } MpmScene;
 MpmScene mpm_scene_default(void);
@@ -54,7 +57,7 @@ typedef struct MpmPoint {
   double volume0;               /* m3 (2D: m2 times unit depth), undeformed; current volume = volume0 det F */
   double size0[3];              /* edges of the undeformed point domain, m (uGIMP keeps them; 2D: size0[2] = 1) */
   double deformation_gradient[9];
-  double velocity_gradient[9];  /* of the last step; out */
+  double velocity_gradient[9];  /* of the last step, as the law saw it; out */
   double stress[6];             /* Cauchy, Pa */
   double affine[9];             /* APIC matrix: velocity near the point = v + affine (x - x_p), 1/s */
   double temperature;           /* incremental T_p (eq. 28) */

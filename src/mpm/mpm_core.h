@@ -78,6 +78,8 @@ typedef struct MpmPoints {
   int load_room;
   MpmVec *gathered;    /* XPIC: {1, intermediate velocity} */
   double *carry;       /* slot: scratch for halo->forward */
+  MpmVec *cell_value;  /* mpm_volumetric.c: {V, V x, 1, 0}, own and foreign. NULL: no means over cells */
+  int *cell_node;      /* of the lowest corner of the cell that the row is in */
   double fastest;      /* m/s, of own points at the last mpm_give_motion(); INFINITY: they moved since */
   double sound;        /* m/s, the largest speed of sound at the last mpm_critical_attached(); INFINITY: none yet */
   int sound_age;       /* steps since */
@@ -124,6 +126,7 @@ typedef struct MpmGrid {
   MpmVec *rate;        /* {Q, f}, then {dT/dt, a} */
   MpmVec *term;        /* XPIC: {-, one term of v*} */
   MpmVec *extended;    /* XPIC: {-, v*}, the velocity that G2P gives the points before the acceleration */
+  MpmVec *cell_sum;    /* mpm_volumetric.c: {sum V, sum V x, points, 0} of the cell whose lowest corner is the node */
   int *contact_of;     /* [nodes] scratch of the walls */
   /* for mpm_grid_view */
   double *view_mass, *view_velocity, *view_temperature;
@@ -221,8 +224,14 @@ static inline double mpm_largest_spacing(const Mpm *mpm) {
 static inline int mpm_width(const Mpm *mpm) { return mpm_shape_width(mpm->scene.shape); }
 static inline int mpm_load_width(const Mpm *mpm) { return 1 + mpm->scene.dimension; }
 
+/* Strain rates and mean stresses are averaged over cells. */
+static inline int mpm_averages(const Mpm *mpm) {
+  return mpm->scene.volumetric == MPM_VOLUMETRIC_CELL && mpm->scene.mechanical;
+}
 /* The array of loads is needed where something adds to what stress and external force alone give. */
-static inline int mpm_uses_load(const Mpm *mpm) { return mpm->halo || mpm->heats || mpm->traction_count > 0; }
+static inline int mpm_uses_load(const Mpm *mpm) {
+  return mpm->halo || mpm->heats || mpm->traction_count > 0 || mpm_averages(mpm);
+}
 /* The law acts on rows where they lie. */
 static inline int mpm_law_is_local(const Mpm *mpm) {
   return mpm->law->advance && !mpm->scene.thermal && !mpm->law->thermal;
@@ -298,12 +307,17 @@ void mpm_g2p_velocity(Mpm *mpm, const MpmVec *field);  /* field -> gathered */
 /* Gradient, local law and, with_load, its load on the nodes, some cells at a time: they stay in the cache. */
 void mpm_stress(Mpm *mpm, int with_load);
 
+/* mpm_volumetric.c. Collective */
+BaseStatus mpm_volumetric_gradient(Mpm *mpm); /* velocity gradient of own rows: its trace becomes the mean of the cell */
+BaseStatus mpm_volumetric_load(Mpm *mpm);     /* load of own rows: as if the mean stress were that of the cell */
+
 /* mpm_xpic.c */
 BaseStatus mpm_extended_velocity(Mpm *mpm);                          /* XPIC: state -> extended. Collective */
 
 /* mpm_law_batch.c */
 BaseStatus mpm_law_run(Mpm *mpm, double dt); /* the law for own points, from velocity_gradient. Collective */
 void mpm_law_rows(Mpm *mpm, int first, int end); /* the same, and F, of a local law for some rows */
+void mpm_law_all_rows(Mpm *mpm);                 /* for all own rows */
 /* Loads: own points', tractions, flux walls, those of foreign points. Collective. */
 BaseStatus mpm_load_fill(Mpm *mpm);
 

@@ -21,7 +21,7 @@ BaseStatus mpm_grid_reserve_cells(MpmGrid *grid, int cells) {
   return BASE_OK;
 }
 
-static BaseStatus reserve_nodes(MpmGrid *grid, int nodes, int thermal, int extended) {
+static BaseStatus reserve_nodes(MpmGrid *grid, int nodes, const MpmScene *scene) {
   if (nodes <= grid->node_room) return BASE_OK;
   const size_t room = (size_t)nodes + (size_t)nodes / 4 + 16;
   TRY(BASE_GROW(0, room, &grid->index));
@@ -30,13 +30,16 @@ static BaseStatus reserve_nodes(MpmGrid *grid, int nodes, int thermal, int exten
   TRY(BASE_GROW(0, room, &grid->lowest_tag));
   TRY(BASE_GROW(0, room, &grid->state));
   TRY(BASE_GROW(0, room, &grid->rate));
-  if (extended) TRY(BASE_GROW(0, room, &grid->extended));
-  if (extended) TRY(BASE_GROW(0, room, &grid->term));
+  if (scene->transfer == MPM_TRANSFER_XPIC) {
+    TRY(BASE_GROW(0, room, &grid->extended));
+    TRY(BASE_GROW(0, room, &grid->term));
+  }
+  if (scene->volumetric == MPM_VOLUMETRIC_CELL) TRY(BASE_GROW(0, room, &grid->cell_sum));
   TRY(BASE_GROW(0, room, &grid->contact_of));
   TRY(BASE_GROW(0, room, &grid->view_mass));
   TRY(BASE_GROW(0, 3 * room, &grid->view_velocity));
   TRY(BASE_GROW(0, room, &grid->owned));
-  if (thermal) {
+  if (scene->thermal) {
     TRY(BASE_GROW(0, room, &grid->heat));
     TRY(BASE_GROW(0, room, &grid->view_temperature));
   }
@@ -50,7 +53,7 @@ void mpm_grid_free(MpmGrid *grid) {
       grid->sum,      grid->heat,       grid->scale,      grid->lowest_tag, grid->state,         grid->rate,
       grid->extended, grid->term,       grid->contact_of, grid->view_mass,  grid->view_velocity, grid->view_temperature,
       grid->owned,    grid->dilated[0], grid->dilated[1], grid->run,        grid->run_first,     grid->next_key,
-      grid->next_first};
+      grid->next_first, grid->cell_sum};
   for (size_t k = 0; k < sizeof memory / sizeof *memory; k++) base_free(memory[k]);
   for (int axis = 0; axis < 3; axis++)
     for (int w = 0; w < MPM_WIDTH_MAX; w++) base_free(grid->position[axis][w]);
@@ -100,7 +103,7 @@ static BaseStatus build_nodes(Mpm *mpm) {
   TRY(dilate(grid, grid->dilated[0], count[0], 1, width, 1, &count[1]));
   if (dimension == 3) TRY(dilate(grid, grid->dilated[1], count[1], 2, width, 0, &count[2]));
   grid->nodes = count[dimension - 1];
-  TRY(reserve_nodes(grid, grid->nodes, mpm->scene.thermal, mpm->scene.transfer == MPM_TRANSFER_XPIC));
+  TRY(reserve_nodes(grid, grid->nodes, &mpm->scene));
   grid->node_key = grid->dilated[dimension == 3 ? 0 : 1];
   grid->has_index = 0;
   for (int cell = 0; cell < grid->cells; cell++)

@@ -7,6 +7,8 @@
 #include "mpm_deform.h"
 #include "mpm_kernel.h"
 
+enum { CHUNK = 128 /* rows */ };
+
 /* -------------------------------------------------------------------------------------------- deformation, rows */
 
 /* Calls body(arguments, n) for four rows at a time from k on, n of them; the usual n is a constant. */
@@ -96,6 +98,12 @@ void mpm_law_rows(Mpm *mpm, int first, int end) {
   check_rows(mpm, first, end);
 }
 
+void mpm_law_all_rows(Mpm *mpm) {
+  const int rows = mpm->points.live;
+#pragma omp parallel for num_threads(mpm->threads) if (mpm_is_parallel(mpm))
+  for (int first = 0; first < rows; first += CHUNK) mpm_law_rows(mpm, first, first + CHUNK < rows ? first + CHUNK : rows);
+}
+
 /* ------------------------------------------------------------------------------------------------------- batch */
 
 static void fill_row(Mpm *mpm, int k, double dt) {
@@ -136,7 +144,6 @@ static void take_answer(Mpm *mpm, int k) {
 
 BaseStatus mpm_law_run(Mpm *mpm, double dt) {
   MpmPoints *p = &mpm->points;
-  enum { CHUNK = 128 };
   TRY(mpm_batch_reserve(mpm, p->own));
   const int is_parallel = mpm->threads > 1 && p->live > MPM_PARALLEL_POINTS;
 #pragma omp parallel for num_threads(mpm->threads) if (is_parallel)
@@ -206,6 +213,7 @@ BaseStatus mpm_load_fill(Mpm *mpm) {
     p->load_room = p->room;
   }
   fill_own_loads(mpm);
+  if (mpm_averages(mpm)) TRY(mpm_volumetric_load(mpm));
   if (p->live > 0 && mpm->scene.mechanical) mpm_traction_add(mpm, p->load);
   if (p->live > 0 && mpm->heats) mpm_heat_walls(mpm, p->load);
   return mpm->halo ? forward_loads(mpm) : BASE_OK;

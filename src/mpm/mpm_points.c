@@ -77,6 +77,10 @@ BaseStatus mpm_points_reserve(Mpm *mpm, int count) {
   if (scene->order != MPM_ORDER_USF) TRY(BASE_GROW(0, room, &p->old_position));
   if (scene->thermal) TRY(BASE_GROW(0, room, &p->heat));
   if (scene->transfer == MPM_TRANSFER_XPIC) TRY(BASE_GROW(0, room, &p->gathered));
+  if (scene->volumetric == MPM_VOLUMETRIC_CELL) {
+    TRY(BASE_GROW(0, room, &p->cell_value));
+    TRY(BASE_GROW(0, room, &p->cell_node));
+  }
   if (mpm->halo) {
     TRY(BASE_GROW(0, 16 * room, &p->carry));
     TRY(BASE_GROW(0, room, &p->foreign_slot));
@@ -122,7 +126,8 @@ void mpm_points_free(Mpm *mpm) {
   MpmPoints *p = &mpm->points;
   for (int n = 0; n < p->planes; n++) base_free(p->plane[n].spare);
   void *const memory[] = {p->block, p->old_position, p->heat, p->load, p->gathered, p->carry, p->moves, p->mover,
-                          p->source, p->region, p->fetch, p->foreign_slot, p->item, p->spare_item, p->law_tag,
+                          p->cell_value, p->cell_node, p->source, p->region, p->fetch, p->foreign_slot,
+                          p->item, p->spare_item, p->law_tag,
                           p->law_velocity_gradient, p->law_deformation_gradient, p->law_temperature,
                           p->law_temperature_rate, p->batch.stress, p->batch.heat, p->batch.conductivity,
                           p->batch.modulus, p->batch.scalars};

@@ -48,6 +48,7 @@ BaseStatus mpm_scene_check(const MpmScene *scene) {
   TRY(check_integer("shape", (int)scene->shape, MPM_SHAPE_LINEAR, MPM_SHAPE_BSPLINE));
   TRY(check_integer("transfer", (int)scene->transfer, MPM_TRANSFER_FLIP, MPM_TRANSFER_XPIC));
   TRY(check_integer("order", (int)scene->order, MPM_ORDER_USF, MPM_ORDER_MUSL));
+  TRY(check_integer("volumetric", (int)scene->volumetric, MPM_VOLUMETRIC_POINT, MPM_VOLUMETRIC_CELL));
   TRY(check_number("pic_fraction", scene->pic_fraction, 0.0, 1.0));
   if (scene->transfer == MPM_TRANSFER_XPIC) TRY(check_integer("xpic_order", scene->xpic_order, 1, 10));
   TRY(check_number("point_damping", scene->point_damping, 0.0, 1e300));

@@ -291,16 +291,25 @@ static BaseStatus renew_state(Mpm *mpm) {
 
 /* ---------------------------------------------------------------------------------------------------- the step */
 
+/* Velocity gradient and law; is_fused: and its load on the nodes. */
+static BaseStatus find_stress(Mpm *mpm, int is_fused) {
+  const int is_local = mpm_law_is_local(mpm), averages = mpm_averages(mpm);
+  if (is_local && !averages) {
+    mpm_stress(mpm, is_fused);
+    return BASE_OK;
+  }
+  mpm_g2p_velocity_gradient(mpm);
+  if (averages) TRY(mpm_volumetric_gradient(mpm));
+  if (!is_local) return mpm_law_run(mpm, mpm->dt);
+  mpm_law_all_rows(mpm);
+  return BASE_OK;
+}
+
 /* USF (TM-DEMPM fig. 3): the law first, with the velocity of the incoming points. */
 static BaseStatus step_law_first(Mpm *mpm) {
   const int is_fused = mpm_law_is_local(mpm) && !mpm_uses_load(mpm);
-  if (mpm_law_is_local(mpm)) {
-    mpm_stress(mpm, is_fused);
-  } else {
-    if (mpm->scene.mechanical) mpm_g2p_velocity_gradient(mpm);
-    if (mpm->heats) mpm_g2p_temperature_gradient(mpm);
-    if (mpm->scene.mechanical) TRY(mpm_law_run(mpm, mpm->dt)); /* at rest conductivities stay what they were */
-  }
+  if (mpm->heats) mpm_g2p_temperature_gradient(mpm);
+  if (mpm->scene.mechanical) TRY(find_stress(mpm, is_fused)); /* at rest conductivities stay what they were */
   drop_points_if_failed(mpm); /* before one bad stress reaches its neighbours, and the message names them */
   if (!is_fused) TRY(find_rates(mpm));
   return advance(mpm);
@@ -313,12 +322,7 @@ static BaseStatus step_law_last(Mpm *mpm) {
   TRY(advance(mpm));
   if (mpm->scene.mechanical) {
     TRY(renew_state(mpm));
-    if (mpm_law_is_local(mpm)) {
-      mpm_stress(mpm, 0);
-      return BASE_OK;
-    }
-    mpm_g2p_velocity_gradient(mpm);
-    TRY(mpm_law_run(mpm, mpm->dt));
+    TRY(find_stress(mpm, 0));
   }
   return BASE_OK;
 }

@@ -134,6 +134,7 @@ class Scene:
         points, per_cell = runs[0].points, round(size["grid"] / size.get("spacing", size["grid"])) ** 2
         label = f"multiscale, {points} x {grains}" + (f", {per_cell} per cell" if per_cell > 1 else "")
         label += f", {size['shape']}" if "shape" in size else ""
+        label += ", means over cells" if size.get("volumetric") == "cell" else ""
         return Side(label, runs, [self.answer(run, "multiscale") for run in runs], points * grains)
 
 

@@ -12,7 +12,8 @@ LINES = np.arange(0, 4.0 + 1e-9, CELL), np.arange(0, 1.25 + 1e-9, CELL)
 SIZES = [dict(spacing=1 / n, grid=1 / n, step=2e-3 / n) for n in (8, 12, 16, 24)]
 LEVELS = [(SIZES[0], 100), (SIZES[1], 36), (SIZES[2], 36), (SIZES[2], 100), (SIZES[3], 36)]
 # Four points in a cell, to see what that changes.
-FOUR = {"dry": [(dict(spacing=1 / 8, grid=1 / 4, step=5e-4), 100), (dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 36),
+FOUR = {"dry": [(dict(spacing=1 / 8, grid=1 / 4, step=5e-4), 100),
+                (dict(spacing=1 / 8, grid=1 / 4, step=5e-4, volumetric="cell"), 100), (dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 36),
                 (dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 100), (dict(spacing=1 / 24, grid=1 / 12, step=1 / 6000), 100)],
         "melting": [(dict(spacing=1 / 16, grid=1 / 8, step=2.5e-4), 36)]}
 BEST = 4  # which of the levels the figures show

@@ -17,12 +17,12 @@ def scene(boundary, transfer, extra=""):
     return BOX.format(boundary=boundary) + POINTS + ELASTIC.format(transfer=transfer, extra=extra) + RUN
 
 
-@pytest.mark.parametrize("transfer", ["flip 0.99", "apic", "xpic 3"])
-def test_points_are_equal_on_1_2_3_4_ranks(transfer, dempm, tmp_path):
-    """The floor, a moving box and 3 or 4 parts of the domain; points migrate."""
-    one = dempm(scene("f f", transfer), cwd=tmp_path / "1")
+@pytest.mark.parametrize("transfer, extra", [("flip 0.99", ""), ("apic", ""), ("xpic 3", ""), ("flip 0.99", "volumetric cell")])
+def test_points_are_equal_on_1_2_3_4_ranks(transfer, extra, dempm, tmp_path):
+    """The floor, a moving box and 3 or 4 parts of the domain, which cut cells; points migrate."""
+    one = dempm(scene("f f", transfer, extra), cwd=tmp_path / "1")
     for np in (2, 3, 4):
-        many = dempm(scene("f f", transfer), np=np, cwd=tmp_path / str(np))
+        many = dempm(scene("f f", transfer, extra), np=np, cwd=tmp_path / str(np))
         for step in (0, 250, 500):
             assert state(many, step) == state(one, step)
         for name, values in one.table.items():
@@ -32,9 +32,10 @@ def test_points_are_equal_on_1_2_3_4_ranks(transfer, dempm, tmp_path):
                 assert many.table[name] == pytest.approx(values, rel=1e-12, abs=1e-12 * max(map(abs, values))), name
 
 
-def test_periodic_box_is_equal_on_1_2_4_ranks(dempm, tmp_path):
+@pytest.mark.parametrize("extra", ["", "volumetric cell"])
+def test_periodic_box_is_equal_on_1_2_4_ranks(extra, dempm, tmp_path):
     """The block moves through a periodic boundary; images of points come from this rank itself or from another."""
-    script = scene("p f", "flip 0.99").replace("vx 0.5", "vx 8")
+    script = scene("p f", "flip 0.99", extra).replace("vx 0.5", "vx 8")
     script = re.sub(r"fix ram.*\n|unfix ram|f_ram.1.", "", script)
     one = dempm(script, cwd=tmp_path / "1")
     x = [float(line.split()[1]) for line in state(one, 500).values()]

@@ -11,9 +11,9 @@ thermo_modify format float %.15g
 """
 
 
-def scripts(boundary, way):
+def scripts(boundary, way, extra=""):
     """(first part, continuation). way: how the restart file comes about."""
-    tail = ELASTIC.format(transfer="flip 0.99", extra="") + THERMO + state_dump(200)
+    tail = ELASTIC.format(transfer="flip 0.99", extra=extra) + THERMO + state_dump(200)
     first = BOX.format(boundary=boundary) + POINTS + tail
     if way == "command":
         first += "run 200\nwrite_restart half\nrun 200\n"
@@ -44,9 +44,9 @@ def test_restart_continues_to_the_last_bit(way, boundary, dempm, tmp_path):
         assert again.table[name][0] == pytest.approx(before, rel=1e-13)
 
 
-@pytest.mark.parametrize("before, after", [(1, 2), (2, 1), (2, 3)])
-def test_restart_on_another_number_of_ranks(before, after, dempm, tmp_path):
-    first, second = scripts("f f", "during")
+@pytest.mark.parametrize("before, after, extra", [(1, 2, ""), (2, 1, "volumetric cell"), (2, 3, "")])
+def test_restart_on_another_number_of_ranks(before, after, extra, dempm, tmp_path):
+    first, second = scripts("f f", "during", extra)
     through = dempm(first, np=before, cwd=tmp_path)
     expected = state(through, 400)
     (tmp_path / "state.400.txt").unlink()

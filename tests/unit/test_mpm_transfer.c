@@ -231,6 +231,7 @@ static void results_do_not_depend_on_threads_or_on_the_callers_order(void **stat
         int count;
         MpmScene scene = make_scene(dimension, (MpmShape)shape, &kinds[k], k == 3 ? MPM_ORDER_MUSL : MPM_ORDER_USF);
         scene.thermal = 1;
+        scene.volumetric = k == 3 ? MPM_VOLUMETRIC_CELL : MPM_VOLUMETRIC_POINT;
         /* Enough points that the threads do start (2,000). */
         const int edge = dimension == 3 ? 15 : 50;
         MpmPoint *reference = run_reference(&scene, 1, 0, edge, &count);
@@ -350,6 +351,7 @@ static void results_do_not_depend_on_ranks(void **state) {
           int count;
           MpmScene scene = make_scene(dimension, (MpmShape)shape, &kinds[k], (MpmOrder)order);
           scene.thermal = 1;
+          scene.volumetric = (k + shape) % 2 ? MPM_VOLUMETRIC_CELL : MPM_VOLUMETRIC_POINT;
           const int edge = dimension == 3 ? 8 : 14;
           MpmPoint *reference = run_reference(&scene, 1, 0, edge, &count);
           MpmPoint *split = run_on_two_ranks(&scene, (k + order) % 2, edge, &count);
