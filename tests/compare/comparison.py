@@ -128,7 +128,7 @@ class Scene:
         runs = []
         for k in range(replicates):
             packings = [self.pack(study, "rve", grains, 4 * k + seed, scale) for seed in range(1, 5)]
-            words = {**variables, **size, "packing": [p.name for p in packings], **self.scaled(scale)}
+            words = {**variables, **size, "packing": " ".join(p.name for p in packings), **self.scaled(scale)}
             name = "_".join(["multiscale", *(v if isinstance(v, str) else f"{v:g}" for v in size.values()), str(grains), str(k)])
             runs.append(study.run(name, "in.multiscale", words, [self.folder], packings, grains=grains, threads=1))
         points, per_cell = runs[0].points, round(size["grid"] / size.get("spacing", size["grid"])) ** 2
