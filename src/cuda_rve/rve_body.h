@@ -73,7 +73,10 @@ RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, 
     const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1], a->velocity[0],
                                  a->velocity[1]};
     const double *const f1[4] = {a->spin[0], a->radius, ft.viscous ? a->mass : 0, 0};
-    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0), p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
+    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0);
+    RveQuad p;
+    if (ft.viscous) p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
+    else rve_gather_pair(a->row + 4, f1, a->neighbour, lane0, p.f), p.f[2] = rve_set(0.0);
     for (int k = 0; k < 2; k++) other->s[k] = rve_int_from_bits(q.f[k]), other->v[k] = q.f[k + 2];
     other->w[0] = p.f[0], other->r = p.f[1], other->m = p.f[2];
     return;

@@ -63,8 +63,7 @@ RVE_FN rve_near rve_cap(RveFeatures ft, const RveContactPass *c, rve_near fn) {
 RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, near_mask touch, near_mask bonded, rve_near trial,
                               rve_near vt, rve_near fn, rve_near gt, rve_near *spring, rve_near *total, rve_near *slip,
                               rve_near *loss) {
-  const rve_near zero = near_set(0.0), cap = rve_cap(ft, c, fn);
-  rve_near f = near_min(near_max(trial, zero - cap), cap);
+  rve_near f = near_limit(trial, rve_cap(ft, c, fn));
   if (ft.bonds) f = near_select(bonded, trial, f);
   f = near_keep(touch, f);
   *slip = *slip + (trial - f) * f; /* times 1/kt: |f| times the slip distance; same sign, so no modulus */

@@ -24,8 +24,8 @@ typedef rve_mask near_mask;
 #define near_sqrt rve_sqrt
 #define near_inverse_sqrt rve_inverse_sqrt
 #define near_min rve_min
-#define near_max rve_max
 #define near_abs rve_abs
+#define near_limit rve_limit
 #define near_less rve_less
 #define near_and rve_and
 #define near_or rve_or
@@ -84,8 +84,8 @@ RVE_FN rve_near near_inverse_sqrt(rve_near a) {
   return y * (near_set(1.5) - near_set(0.5) * a * y * y);
 }
 RVE_FN rve_near near_min(rve_near a, rve_near b) { return _mm512_min_ps(a, b); }
-RVE_FN rve_near near_max(rve_near a, rve_near b) { return _mm512_max_ps(a, b); }
 RVE_FN rve_near near_abs(rve_near a) { return _mm512_abs_ps(a); }
+RVE_FN rve_near near_limit(rve_near a, rve_near most) { return _mm512_range_ps(a, most, 2); }
 RVE_FN near_mask near_less(rve_near a, rve_near b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 RVE_FN near_mask near_and(near_mask a, near_mask b) { return (near_mask)(a & b); }
 RVE_FN near_mask near_or(near_mask a, near_mask b) { return (near_mask)(a | b); }

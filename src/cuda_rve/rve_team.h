@@ -91,6 +91,8 @@ RVE_FN rve_real rve_sqrt(rve_real a) { return _mm512_sqrt_pd(a); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return _mm512_min_pd(a, b); }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return _mm512_max_pd(a, b); }
 RVE_FN rve_real rve_abs(rve_real a) { return _mm512_abs_pd(a); }
+/* a, or +-most where it is further from 0; most >= 0. */
+RVE_FN rve_real rve_limit(rve_real a, rve_real most) { return _mm512_range_pd(a, most, 2); }
 RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); }
 RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return (rve_mask)(a & b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return (rve_mask)(a | b); }
@@ -238,6 +240,10 @@ RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return m ? a : 0.0; }
 
 #endif
 
+#if !defined(RVE_ISA_AVX512)
+RVE_FN rve_real rve_limit(rve_real a, rve_real most) { return rve_min(rve_max(a, rve_set(0.0) - most), most); }
+#endif
+
 #ifdef RVE_MIXED
 enum { RVE_PARTS = 2 };
 #else
@@ -277,28 +283,28 @@ typedef struct RveQuad {
 } RveQuad;
 
 #if defined(RVE_ISA_AVX512)
+/* Of quarters a0 a1 a2 a3 and b0 b1 b2 b3: a0 b0 a2 b2, and a1 b1 a3 b3. A permutation of two registers (vpermt2pd)
+ * would do the same, but on a Zen 4 keeps a multiplier busy besides a shuffle unit. */
+RVE_FN rve_real rve_even_quarters(rve_real a, rve_real b) { return _mm512_mask_permutex_pd(a, 0xcc, b, 0x44); }
+RVE_FN rve_real rve_odd_quarters(rve_real a, rve_real b) { return _mm512_mask_permutex_pd(b, 0x33, a, 0xee); }
 RVE_FN RveQuad rve_transpose(const RveFour row[RVE_SPAN]) {
   RveQuad q;
   rve_real r[4];
   for (int k = 0; k < 4; k++) r[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(row[k]), row[k + 4], 1);
-  const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
-                second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   const rve_real a = _mm512_unpacklo_pd(r[0], r[1]), b = _mm512_unpackhi_pd(r[0], r[1]);
   const rve_real c = _mm512_unpacklo_pd(r[2], r[3]), d = _mm512_unpackhi_pd(r[2], r[3]);
-  q.f[0] = _mm512_permutex2var_pd(a, first, c);
-  q.f[1] = _mm512_permutex2var_pd(b, first, d);
-  q.f[2] = _mm512_permutex2var_pd(a, second, c);
-  q.f[3] = _mm512_permutex2var_pd(b, second, d);
+  q.f[0] = rve_even_quarters(a, c);
+  q.f[1] = rve_even_quarters(b, d);
+  q.f[2] = rve_odd_quarters(a, c);
+  q.f[3] = rve_odd_quarters(b, d);
   return q;
 }
 /* row[k]: rows k and k + 4. */
 RVE_FN void rve_transpose_halves(RveQuad q, rve_real row[4]) {
-  const __m512i first = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
-                second = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   const rve_real a = _mm512_unpacklo_pd(q.f[0], q.f[1]), b = _mm512_unpackhi_pd(q.f[0], q.f[1]);
   const rve_real c = _mm512_unpacklo_pd(q.f[2], q.f[3]), d = _mm512_unpackhi_pd(q.f[2], q.f[3]);
-  row[0] = _mm512_permutex2var_pd(a, first, c), row[1] = _mm512_permutex2var_pd(b, first, d);
-  row[2] = _mm512_permutex2var_pd(a, second, c), row[3] = _mm512_permutex2var_pd(b, second, d);
+  row[0] = rve_even_quarters(a, c), row[1] = rve_even_quarters(b, d);
+  row[2] = rve_odd_quarters(a, c), row[3] = rve_odd_quarters(b, d);
 }
 RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_SPAN]) {
   rve_real r[4];
@@ -444,8 +450,9 @@ RVE_FN void rve_scatter_pairs(double *rows, double *const field[2], int lane0, r
 #elif defined(RVE_ISA_AVX512)
   (void)field;
   rows += (size_t)lane0 * 2;
-  rve_store(rows, 0, _mm512_permutex2var_pd(a, _mm512_setr_epi64(0, 8, 4, 12, 1, 9, 5, 13), b));
-  rve_store(rows, 8, _mm512_permutex2var_pd(a, _mm512_setr_epi64(2, 10, 6, 14, 3, 11, 7, 15), b));
+  const rve_real even = _mm512_unpacklo_pd(a, b), odd = _mm512_unpackhi_pd(a, b);
+  rve_store(rows, 0, _mm512_shuffle_f64x2(even, odd, 0x88));
+  rve_store(rows, 8, _mm512_shuffle_f64x2(even, odd, 0xdd));
 #elif defined(RVE_ISA_AVX2)
   const rve_real even = _mm256_unpacklo_pd(a, b), odd = _mm256_unpackhi_pd(a, b);
   (void)field;
@@ -472,6 +479,22 @@ RVE_FN void rve_unpair(const RveTwo pair[RVE_SPAN], rve_real sum[2]) {
 #endif
 }
 #endif
+
+/* Two fields of the grains that `offset` names: rve_gather() with fewer shuffles. */
+RVE_FN void rve_gather_pair(const double *rows, const double *const field[2], const uint32_t *offset, int lane0,
+                            rve_real two[2]) {
+#if defined(__CUDACC__)
+  const uint32_t at = offset[lane0 + RVE_LANE];
+  (void)rows;
+  two[0] = field[0][at], two[1] = field[1][at];
+#else
+  RveTwo pair[RVE_SPAN];
+  (void)field;
+  offset += lane0;
+  for (int l = 0; l < RVE_SPAN; l++) pair[l] = rve_two(rows + offset[l]);
+  rve_unpair(pair, two);
+#endif
+}
 
 /* ------------------------------------------------------------------------------------------------------- reductions */
 #if defined(__CUDACC__)
