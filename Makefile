@@ -136,6 +136,13 @@ $(BUILD)/bench/isa/%.o: tests/bench/isa.c $(READY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -Isrc -c $< -o $@
 .SECONDARY: $(BENCH_OBJECTS)
+# The device's source on the host: a fiber for each of its threads, see tests/cuda_host/cuda_runtime.h.
+$(BUILD)/cuda_host/device.o: src/cuda_rve/rve_backend_cuda.cu tests/cuda_host/cuda_runtime.h $(READY)
+	@mkdir -p $(@D)
+	$(SHOW) $(CXX) -x c++ -std=c++17 -Wall -Wextra -Wno-unknown-pragmas $(WERROR) $(OPT) $(FUSE) -fno-extern-tls-init -MMD -MP \
+	  -D__CUDACC__ -DDEMPM_CUDA -Itests/cuda_host -c $< -o $@
+$(BUILD)/cuda_host/%: tests/unit/%.c $(BUILD)/cuda_host/device.o $(LIBRARY)
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $^ -lcmocka $(C_LIBS) -lstdc++ -o $@
 $(BUILD)/tools/%: tests/tools/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
@@ -149,7 +156,7 @@ $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 RUN_ENV = DEMPM_BUILD=$(abspath $(BUILD)) MPIRUN=$(MPIRUN) PYTHON=$(PYTHON)
 PYTEST = $(RUN_ENV) $(PYTHON) -m pytest -q -p no:cacheprovider
 
-test: programs $(TESTS) $(TOOLS)
+test: programs $(TESTS) $(TOOLS) $(BUILD)/cuda_host/test_rve_device
 	$(PYTEST) tests
 test-unit: $(TESTS)
 	$(PYTEST) tests/test_unit.py
@@ -157,6 +164,9 @@ test-scenes: programs $(TOOLS)
 	$(PYTEST) tests --ignore=tests/test_unit.py
 test-gpu: $(TESTS)
 	$(RUN_ENV) DEMPM_BACKEND=cuda $(PYTHON) -m pytest -q -p no:cacheprovider tests/test_unit.py
+HOST_TESTS = $(patsubst tests/unit/%.c,$(BUILD)/cuda_host/%,$(wildcard tests/unit/test_rve_*.c))
+test-cuda-host: $(HOST_TESTS)
+	$(foreach t,$(HOST_TESTS),DEMPM_BACKEND=cuda $(t) &&) true
 SANITIZED = $(MAKE) BUILD=$(BUILD)/sanitize OPT="-O1 -g -fno-omit-frame-pointer" NVCC= \
             SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
 sanitize:

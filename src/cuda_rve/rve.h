@@ -137,6 +137,9 @@ typedef struct RveBatch RveBatch;
 
 /* 1 if CUDA was built in and a device answers. */
 int rve_device_present(void);
+/* Of several processes on a machine with several devices, number `process` (from 0) takes device `process` modulo their number.
+ * Before the first batch; 0 unless said. */
+void rve_device_share(int process);
 
 /* Creates `count` RVEs; RVE k is a copy of packings[packing_of_rve[k]] (NULL: all of packings[0]).
  * Copies what it needs; borrows nothing. BASE_ERROR_ARGUMENT, BASE_ERROR_MEMORY, BASE_ERROR_DEVICE. */

@@ -9,7 +9,7 @@
 #include "rve_measure.h"
 #include "rve_step.h"
 
-enum { WARPS_MAX = 16, VARIANTS = 8 };
+enum { WARPS_MAX = 16, VARIANTS = 8, STREAMS = 2, PART = 2048 /* jobs of one launch, at most */ };
 
 /* One RVE's place on the device. */
 typedef struct DeviceArena {
@@ -24,15 +24,19 @@ typedef struct DeviceJob {
   RveCounts counts;
   char *arena, *scratch;
   size_t bytes;
+  int place; /* in the caller's list */
 } DeviceJob;
 
 struct RveDevice {
+  int id;             /* of CUDA */
   int count;          /* RVEs known */
   DeviceArena *arena; /* host array */
-  DeviceJob *host, *device;
+  cudaStream_t stream[STREAMS];
+  DeviceJob *host, *device; /* host: pinned, so that copies run beside kernels */
   int jobs; /* room in both */
-  char *scratch;
-  size_t scratch_bytes;
+  int part; /* jobs of one launch, at most */
+  char *scratch[STREAMS];
+  size_t scratch_bytes[STREAMS];
   int shared_limit; /* bytes of shared memory that a block may ask for */
 };
 
@@ -109,30 +113,51 @@ int rve_device_present(void) {
 }
 
 static const RveKernels device_layout = {"cuda", RVE_PACK, {0, 0}, {0, 0}, NULL, NULL};
+static int process_of_machine; /* which of those that share the machine's devices this one is */
+
+void rve_device_share(int process) { process_of_machine = process; }
+
+static BaseStatus choose_device(int *id) {
+  int devices = 0;
+  TRY(checked(cudaGetDeviceCount(&devices), "counting devices"));
+  *id = process_of_machine % devices;
+  return checked(cudaSetDevice(*id), "choosing the device");
+}
+
+/* All that a kernel may have is asked for once. */
+static BaseStatus reserve_shared(RveDevice *device) {
+  TRY(checked(cudaDeviceGetAttribute(&device->shared_limit, cudaDevAttrMaxSharedMemoryPerBlockOptin, device->id),
+              "asking for shared memory"));
+  int own = 0; /* what kernels declare themselves */
+  for (int k = 0; k < VARIANTS; k++) {
+    cudaFuncAttributes attributes;
+    TRY(checked(cudaFuncGetAttributes(&attributes, (const void *)kernels[k]), "loading a kernel"));
+    own = (int)attributes.sharedSizeBytes > own ? (int)attributes.sharedSizeBytes : own;
+  }
+  device->shared_limit -= own;
+  for (int k = 0; k < VARIANTS; k++)
+    TRY(checked(cudaFuncSetAttribute((const void *)kernels[k], cudaFuncAttributeMaxDynamicSharedMemorySize, device->shared_limit),
+                "reserving shared memory"));
+  return BASE_OK;
+}
+
+static BaseStatus open_device(RveDevice *device) {
+  device->part = PART;
+  TRY(choose_device(&device->id));
+  TRY(reserve_shared(device));
+  for (int k = 0; k < STREAMS; k++) TRY(checked(cudaStreamCreate(&device->stream[k]), "opening a stream"));
+  return BASE_OK;
+}
 
 BaseStatus rve_device_create(const RveKernels **layout, RveDevice **result) {
   RveDevice *device = NULL;
-  int id = 0;
   *result = NULL;
   *layout = &device_layout;
   if (!rve_device_present())
     return base_error(BASE_ERROR_DEVICE, "backend cuda: no CUDA device answers (allowed without one: auto, cpu)");
   TRY(BASE_ALLOC(1, &device));
-  BaseStatus status = checked(cudaGetDevice(&id), "choosing the device");
-  if (status == BASE_OK)
-    status = checked(cudaDeviceGetAttribute(&device->shared_limit, cudaDevAttrMaxSharedMemoryPerBlockOptin, id),
-                     "asking for shared memory");
-  for (int k = 0; k < VARIANTS && status == BASE_OK; k++) {
-    cudaFuncAttributes attributes;
-    status = checked(cudaFuncGetAttributes(&attributes, (const void *)kernels[k]), "loading a kernel");
-    const int room = device->shared_limit - (int)attributes.sharedSizeBytes;
-    if (status == BASE_OK)
-      status =
-          checked(cudaFuncSetAttribute((const void *)kernels[k], cudaFuncAttributeMaxDynamicSharedMemorySize, room),
-                  "reserving shared memory");
-  }
-  device->shared_limit -= 4096; /* what the kernels declare themselves */
-  if (status != BASE_OK) base_free(device);
+  const BaseStatus status = open_device(device);
+  if (status != BASE_OK) rve_device_destroy(device);
   else *result = device;
   return status;
 }
@@ -140,11 +165,26 @@ BaseStatus rve_device_create(const RveKernels **layout, RveDevice **result) {
 void rve_device_destroy(RveDevice *device) {
   if (!device) return;
   for (int k = 0; k < device->count; k++) cudaFree(device->arena[k].arena);
+  for (int k = 0; k < STREAMS; k++) {
+    cudaFree(device->scratch[k]);
+    if (device->stream[k]) cudaStreamDestroy(device->stream[k]);
+  }
   cudaFree(device->device);
-  cudaFree(device->scratch);
-  base_free(device->host);
+  cudaFreeHost(device->host);
   base_free(device->arena);
   base_free(device);
+}
+
+static BaseStatus reserve_arena(DeviceArena *to, const RveCounts *counts, size_t bytes) {
+  if (to->room < bytes) {
+    cudaFree(to->arena);
+    to->arena = NULL, to->room = 0;
+    TRY(checked(cudaMalloc((void **)&to->arena, bytes), "memory for an RVE (allowed without it: backend cpu)"));
+    to->room = bytes;
+  }
+  to->counts = *counts;
+  to->bytes = bytes;
+  return BASE_OK;
 }
 
 BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts, size_t bytes, const void *arena) {
@@ -153,16 +193,8 @@ BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts
     TRY(BASE_GROW((size_t)device->count, (size_t)count, &device->arena));
     device->count = count;
   }
-  DeviceArena *to = &device->arena[rve];
-  if (to->room < bytes) {
-    cudaFree(to->arena);
-    to->arena = NULL, to->room = 0;
-    TRY(checked(cudaMalloc((void **)&to->arena, bytes), "memory for an RVE"));
-    to->room = bytes;
-  }
-  to->counts = *counts;
-  to->bytes = bytes;
-  return checked(cudaMemcpy(to->arena, arena, bytes, cudaMemcpyHostToDevice), "copying an RVE to the device");
+  TRY(reserve_arena(&device->arena[rve], counts, bytes));
+  return checked(cudaMemcpy(device->arena[rve].arena, arena, bytes, cudaMemcpyHostToDevice), "copying an RVE to the device");
 }
 
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
@@ -170,35 +202,48 @@ BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
   return checked(cudaMemcpy(arena, from->arena, from->bytes, cudaMemcpyDeviceToHost), "copying an RVE from the device");
 }
 
-/* Room for `count` jobs and `scratch` bytes of working memory. */
-static BaseStatus reserve(RveDevice *device, int count, size_t scratch) {
-  if (count > device->jobs) {
-    TRY(BASE_GROW((size_t)device->jobs, (size_t)count, &device->host));
-    cudaFree(device->device);
-    device->device = NULL, device->jobs = 0;
-    TRY(checked(cudaMalloc((void **)&device->device, (size_t)count * sizeof *device->device), "memory for jobs"));
-    device->jobs = count;
-  }
-  if (scratch > device->scratch_bytes) {
-    cudaFree(device->scratch);
-    device->scratch = NULL, device->scratch_bytes = 0;
-    TRY(checked(cudaMalloc((void **)&device->scratch, scratch), "working memory for neighbour lists"));
-    device->scratch_bytes = scratch;
-  }
+BaseStatus rve_device_copy(RveDevice *device, int from, int to) {
+  const DeviceArena *model = &device->arena[from];
+  TRY(reserve_arena(&device->arena[to], &model->counts, model->bytes));
+  return checked(cudaMemcpy(device->arena[to].arena, model->arena, model->bytes, cudaMemcpyDeviceToDevice),
+                 "copying an RVE on the device");
+}
+
+static BaseStatus reserve_jobs(RveDevice *device, int count) {
+  if (count <= device->jobs) return BASE_OK;
+  const size_t bytes = (size_t)count * sizeof *device->host;
+  cudaFreeHost(device->host);
+  cudaFree(device->device);
+  device->host = device->device = NULL, device->jobs = 0;
+  TRY(checked(cudaMallocHost((void **)&device->host, bytes), "memory for jobs"));
+  TRY(checked(cudaMalloc((void **)&device->device, bytes), "memory for jobs"));
+  device->jobs = count;
   return BASE_OK;
 }
 
-static size_t scratch_bytes(const RveDevice *device, const RveDeviceJob *job) {
-  RveScratch unused;
-  return rve_scratch_layout(&device->arena[job->rve].counts, job->pairs, NULL, &unused);
+static BaseStatus reserve_scratch(RveDevice *device, int stream, size_t bytes) {
+  if (bytes <= device->scratch_bytes[stream]) return BASE_OK;
+  TRY(checked(cudaStreamSynchronize(device->stream[stream]), "running RVEs"));
+  cudaFree(device->scratch[stream]);
+  device->scratch[stream] = NULL, device->scratch_bytes[stream] = 0;
+  TRY(checked(cudaMalloc((void **)&device->scratch[stream], bytes), "working memory for neighbour lists (allowed without it: backend cpu)"));
+  device->scratch_bytes[stream] = bytes;
+  return BASE_OK;
 }
 
-BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count) {
-  size_t scratch = 0, largest = 0;
-  int blocks = 1;
-  for (int k = 0; k < count; k++) scratch += scratch_bytes(device, &jobs[k]);
-  TRY(reserve(device, count, scratch));
-  scratch = 0;
+static size_t scratch_bytes(const DeviceJob *job) {
+  RveScratch unused;
+  return rve_scratch_layout(&job->counts, job->job.pairs, NULL, &unused);
+}
+
+/* Small packings first: those of one launch have the same number of warps, and all or none of them fit in shared memory. */
+static int compare_jobs(const void *a, const void *b) {
+  const DeviceJob *x = (const DeviceJob *)a, *y = (const DeviceJob *)b;
+  if (x->bytes != y->bytes) return x->bytes < y->bytes ? -1 : 1;
+  return (x->place > y->place) - (x->place < y->place);
+}
+
+static void fill_jobs(RveDevice *device, const RveDeviceJob *jobs, int count) {
   for (int k = 0; k < count; k++) {
     const DeviceArena *arena = &device->arena[jobs[k].rve];
     DeviceJob *job = &device->host[k];
@@ -206,19 +251,72 @@ BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob 
     job->counts = arena->counts;
     job->arena = arena->arena;
     job->bytes = arena->bytes;
-    job->scratch = device->scratch + scratch;
-    scratch += scratch_bytes(device, &jobs[k]);
-    largest = arena->bytes > largest ? arena->bytes : largest;
-    blocks = arena->counts.blocks > blocks ? arena->counts.blocks : blocks;
+    job->place = k;
   }
+  qsort(device->host, (size_t)count, sizeof *device->host, compare_jobs);
+}
+
+static int fits(const RveDevice *device, const DeviceJob *job) { return job->bytes <= (size_t)device->shared_limit; }
+
+/* The end of the launch that begins with job `first`. */
+static int find_end(const RveDevice *device, int first, int count) {
+  int end = first + 1;
+  while (end < count && end - first < device->part && fits(device, &device->host[end]) == fits(device, &device->host[first])) end++;
+  return end;
+}
+
+static BaseStatus reserve_part(RveDevice *device, int stream, int first, int end) {
+  size_t scratch = 0;
+  for (int k = first; k < end; k++) scratch += scratch_bytes(&device->host[k]);
+  TRY(reserve_scratch(device, stream, scratch));
+  scratch = 0;
+  for (int k = first; k < end; k++) {
+    device->host[k].scratch = device->scratch[stream] + scratch;
+    scratch += scratch_bytes(&device->host[k]);
+  }
+  return BASE_OK;
+}
+
+/* To the device, through the kernel and back, while the other stream does the same with other jobs. */
+static BaseStatus launch_part(RveDevice *device, RveFeatures features, int stream, int first, int end) {
+  const cudaStream_t way = device->stream[stream];
+  DeviceJob *const host = device->host + first;
+  DeviceJob *there = device->device + first;
+  const size_t bytes = (size_t)(end - first) * sizeof *host;
+  int blocks = 1, in_shared = fits(device, host);
+  for (int k = first; k < end; k++) blocks = device->host[k].counts.blocks > blocks ? device->host[k].counts.blocks : blocks;
   const int rounds = (blocks + WARPS_MAX - 1) / WARPS_MAX, warps = (blocks + rounds - 1) / rounds;
-  const int in_shared = largest <= (size_t)device->shared_limit;
-  const size_t bytes = (size_t)count * sizeof *device->host;
-  TRY(checked(cudaMemcpy(device->device, device->host, bytes, cudaMemcpyHostToDevice), "copying jobs to the device"));
-  kernels[variant_of(features)]<<<count, 32 * warps, in_shared ? largest : 0>>>(device->device, in_shared);
-  TRY(checked(cudaGetLastError(), "starting a kernel"));
-  TRY(checked(cudaMemcpy(device->host, device->device, bytes, cudaMemcpyDeviceToHost), "running RVEs"));
-  for (int k = 0; k < count; k++) jobs[k] = device->host[k].job;
+  void *arguments[] = {&there, &in_shared};
+  TRY(checked(cudaMemcpyAsync(there, host, bytes, cudaMemcpyHostToDevice, way), "copying jobs to the device"));
+  TRY(checked(cudaLaunchKernel((const void *)kernels[variant_of(features)], dim3((unsigned)(end - first)), dim3(32u * (unsigned)warps),
+                               arguments, in_shared ? device->host[end - 1].bytes : 0, way),
+              "starting a kernel"));
+  return checked(cudaMemcpyAsync(host, there, bytes, cudaMemcpyDeviceToHost, way), "running RVEs");
+}
+
+static BaseStatus launch_all(RveDevice *device, RveFeatures features, int count) {
+  for (int first = 0, end, stream = 0; first < count; first = end, stream = (stream + 1) % STREAMS) {
+    end = find_end(device, first, count);
+    BaseStatus status = reserve_part(device, stream, first, end);
+    while (status == BASE_ERROR_MEMORY && end - first > 1) { /* fewer at a time, from now on */
+      device->part = (end - first) / 2;
+      end = find_end(device, first, count);
+      status = reserve_part(device, stream, first, end);
+    }
+    TRY(status);
+    TRY(launch_part(device, features, stream, first, end));
+  }
+  return BASE_OK;
+}
+
+BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count) {
+  TRY(checked(cudaSetDevice(device->id), "choosing the device"));
+  TRY(reserve_jobs(device, count));
+  fill_jobs(device, jobs, count);
+  const BaseStatus status = launch_all(device, features, count);
+  for (int k = 0; k < STREAMS; k++) TRY(checked(cudaStreamSynchronize(device->stream[k]), "running RVEs"));
+  TRY(status);
+  for (int k = 0; k < count; k++) jobs[device->host[k].place] = device->host[k].job;
   return BASE_OK;
 }
 

@@ -169,14 +169,11 @@ BaseStatus rve_batch_download(const RveBatch *batch, int k) {
   return batch->device ? rve_device_download(batch->device, k, batch->record[k].arena) : BASE_OK;
 }
 
-static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration);
+static BaseStatus device_refresh(RveBatch *batch, int n, const int *index);
 
 BaseStatus rve_batch_refresh(RveBatch *batch, int n, const int *index) {
   BaseStatus first = BASE_OK;
-  if (batch->device) {
-    for (int k = 0; k < n; k++) TRY(rve_batch_upload(batch, index ? index[k] : k));
-    return device_step(batch, n, index, NULL, 0.0);
-  }
+  if (batch->device) return device_refresh(batch, n, index);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
   for (int k = 0; k < n; k++) {
     BaseStatus status =
@@ -293,51 +290,92 @@ static BaseStatus device_conduction(RveBatch *batch, int rve, const RveInput *in
   return answer_conduction(batch, record, input, duration, &batch->workspace[0]);
 }
 
-/* One launch runs all jobs; those whose arena was too small grow on the host and go on. */
-static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
-  int count = 0;
-  for (int k = 0; k < n; k++) {
-    const int rve = index ? index[k] : k;
-    RveDeviceJob *job = &batch->job[count];
-    const RveHead *head = rve_head(batch->record[rve].arena);
-    if (head->failed) continue;
-    memset(job, 0, sizeof *job);
-    TRY(rve_call_make(&batch->scene, head, input ? &input[k] : &nothing, duration, &job->call));
-    job->rve = rve;
-    if (input) job->input = input[k];
-    job->refresh = input == NULL;
-    job->pairs = pairs_for(&batch->record[rve]);
-    job->work_before = batch->record[rve].last.friction_work;
-    job->duration = duration;
-    job->answer = batch->record[rve].last;
-    count++;
-  }
+static BaseStatus add_job(RveBatch *batch, int rve, const RveInput *input, double duration, int *count) {
+  RveDeviceJob *job = &batch->job[*count];
+  const RveHead *head = rve_head(batch->record[rve].arena);
+  if (head->failed) return BASE_OK;
+  memset(job, 0, sizeof *job);
+  TRY(rve_call_make(&batch->scene, head, input ? input : &nothing, duration, &job->call));
+  job->rve = rve;
+  if (input) job->input = *input;
+  job->refresh = input == NULL;
+  job->pairs = pairs_for(&batch->record[rve]);
+  job->work_before = batch->record[rve].last.friction_work;
+  job->duration = duration;
+  job->answer = batch->record[rve].last;
+  ++*count;
+  return BASE_OK;
+}
+
+static BaseStatus grow_on_device(RveBatch *batch, RveDeviceJob *job) {
+  TRY(rve_batch_download(batch, job->rve));
+  TRY(rve_record_grow(&batch->record[job->rve]));
+  TRY(rve_batch_upload(batch, job->rve));
+  job->pairs = pairs_for(&batch->record[job->rve]);
+  return BASE_OK;
+}
+
+static BaseStatus take_answer(RveBatch *batch, const RveDeviceJob *job) {
+  RveRecord *record = &batch->record[job->rve];
+  record->last = job->answer;
+  batch->flown += job->duration > 0.0 && job->answer.flew;
+  rve_head(record->arena)->failed = record->last.status;
+  rve_head(record->arena)->temperature = job->call.temperature;
+  TRY(device_conduction(batch, job->rve, job->refresh ? &nothing : &job->input, job->duration));
+  if (!record->last.status || job->refresh) return BASE_OK;
+  TRY(rve_batch_download(batch, job->rve));
+  rve_head(record->arena)->failed = record->last.status;
+  return rve_note_failure(batch, job->rve, &job->call, &nothing, job->duration, NULL);
+}
+
+/* All jobs at once; those whose arena was too small grow on the host and go on. */
+static BaseStatus run_jobs(RveBatch *batch, int count) {
   for (int pending = count; pending > 0;) {
     TRY(rve_device_run(batch->device, batch->features, batch->job, pending));
     int left = 0;
     for (int k = 0; k < pending; k++) {
       RveDeviceJob *job = &batch->job[k];
-      RveRecord *record = &batch->record[job->rve];
       if (job->outcome == RVE_TOO_SMALL) {
-        TRY(rve_batch_download(batch, job->rve));
-        TRY(rve_record_grow(record));
-        TRY(rve_batch_upload(batch, job->rve));
-        job->pairs = pairs_for(record);
+        TRY(grow_on_device(batch, job));
         batch->job[left++] = *job;
-        continue;
+      } else {
+        TRY(take_answer(batch, job));
       }
-      record->last = job->answer;
-      batch->flown += duration > 0.0 && job->answer.flew;
-      rve_head(record->arena)->failed = record->last.status;
-      rve_head(record->arena)->temperature = job->call.temperature;
-      TRY(device_conduction(batch, job->rve, input ? &job->input : &nothing, duration));
-      if (!record->last.status || !input) continue;
-      TRY(rve_batch_download(batch, job->rve));
-      rve_head(record->arena)->failed = record->last.status;
-      TRY(rve_note_failure(batch, job->rve, &job->call, &nothing, duration, NULL));
     }
     pending = left;
   }
+  return BASE_OK;
+}
+
+static BaseStatus device_refresh(RveBatch *batch, int n, const int *index) {
+  int count = 0;
+  for (int k = 0; k < n; k++) {
+    TRY(rve_batch_upload(batch, index ? index[k] : k));
+    TRY(add_job(batch, index ? index[k] : k, NULL, 0.0, &count));
+  }
+  return run_jobs(batch, count);
+}
+
+/* As host_step(): the first of each set of twins, then copies of it; a twin of one that failed fails by itself. */
+static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
+  rve_twins_sort(batch, n, index, input);
+  for (int followers = 0; followers < 2; followers++) {
+    int count = 0;
+    for (int k = 0; k < n; k++) {
+      const RveTwin *twin = &batch->twin[k];
+      const int follows = twin->leader != twin->rve;
+      if (follows != followers) continue;
+      if (follows && batch->record[twin->leader].last.status == BASE_OK) {
+        TRY(rve_device_copy(batch->device, twin->leader, twin->rve));
+        TRY(rve_twins_copy(batch, twin->leader, twin->rve));
+        batch->shared += duration > 0.0;
+      } else {
+        TRY(add_job(batch, twin->rve, twin->input, duration, &count));
+      }
+    }
+    TRY(run_jobs(batch, count));
+  }
+  rve_twins_renew(batch, n);
   return BASE_OK;
 }
 

@@ -10,6 +10,7 @@ static BaseStatus absent(void) {
 }
 
 int rve_device_present(void) { return 0; }
+void rve_device_share(int process) { (void)process; }
 BaseStatus rve_device_create(const RveKernels **layout, RveDevice **device) {
   *layout = NULL, *device = NULL;
   return absent();
@@ -21,6 +22,10 @@ BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts
 }
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
   (void)device, (void)rve, (void)arena;
+  return absent();
+}
+BaseStatus rve_device_copy(RveDevice *device, int from, int to) {
+  (void)device, (void)from, (void)to;
   return absent();
 }
 BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count) {

@@ -125,9 +125,19 @@ void FixMPMRve::read_conductivity(KeywordParser &parser) {
   }
 }
 
+static int rank_on_machine(MPI_Comm world) {
+  MPI_Comm machine;
+  int rank;
+  MPI_Comm_split_type(world, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
+  MPI_Comm_rank(machine, &rank);
+  MPI_Comm_free(&machine);
+  return rank;
+}
+
 /* All ranks take a GPU or none: another backend has other last bits, and a packing's answer must not depend on its rank. */
 void FixMPMRve::settle_backend() {
   if (backend_ == RVE_BACKEND_CPU) return;
+  rve_device_share(rank_on_machine(world));
   int present = rve_device_present(), everywhere;
   MPI_Allreduce(&present, &everywhere, 1, MPI_INT, MPI_MIN, world);
   if (everywhere) return;

@@ -3,6 +3,7 @@
 #ifndef DEMPM_FARM_HELP_H
 #define DEMPM_FARM_HELP_H
 
+#include "backend_help.h"
 #include "mpi_test.h"
 
 #include <math.h>
@@ -86,7 +87,7 @@ HELP BaseStatus truth_create(const RveScene *scene, Truth *truth) {
   int packing_of_rve[TAGS];
   for (int k = 0; k < TAGS; k++) packing_of_rve[k] = k % PACKINGS;
   memset(truth, 0, sizeof *truth);
-  return rve_batch_create(scene, packing, PACKINGS, packing_of_rve, TAGS, RVE_BACKEND_CPU, &truth->batch);
+  return rve_batch_create(scene, packing, PACKINGS, packing_of_rve, TAGS, help_backend(), &truth->batch);
 }
 
 /* Steps the RVEs of alive tags; answers [TAGS][ANSWER] as the law reports them, rows of others untouched. */
@@ -197,7 +198,7 @@ HELP BaseStatus run_law(MPI_Comm comm, int steps, RveLaw **law, double *answers)
   double volume[TAGS];
   all_alive(alive);
   MPI_Comm_rank(comm, &rank);
-  TRY(rve_law_create(comm, &scene, packing, PACKINGS, RVE_BACKEND_CPU, law));
+  TRY(rve_law_create(comm, &scene, packing, PACKINGS, help_backend(), law));
   for (int k = 0; k < TAGS; k++) tag[k] = k + 1, volume[k] = 1e-4 * (k + 1);
   /* All points on one rank. In two portions, so that ranks hold tags of both and not one range of tags each. */
   TRY(rve_law_assign(*law, rank == 0 ? TAGS / 2 : 0, tag + TAGS - TAGS / 2));

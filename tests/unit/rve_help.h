@@ -17,6 +17,7 @@
 
 #include <cmocka.h>
 
+#include "backend_help.h"
 #include "base/tensor.h"
 #include "cuda_rve/rve.h"
 
@@ -100,7 +101,7 @@ HELP void help_heat(RveScene *scene) {
 
 HELP RveBatch *help_batch(const RveScene *scene, const RvePacking *packing) {
   RveBatch *batch;
-  MUST(rve_batch_create(scene, packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch));
+  MUST(rve_batch_create(scene, packing, 1, NULL, 1, help_backend(), &batch));
   return batch;
 }
 

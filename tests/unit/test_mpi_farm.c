@@ -14,7 +14,7 @@ static void answers_are_those_of_one_serial_batch_while_points_migrate(void **st
   threaded.threads = 2;
   all_alive(alive);
   CHECK_ALL(truth_create(&scene, &truth) == BASE_OK);
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &threaded, packing, PACKINGS, RVE_BACKEND_CPU, &law) == BASE_OK);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &threaded, packing, PACKINGS, help_backend(), &law) == BASE_OK);
   CHECK_ALL(rve_law_threads(law) == 2 && assign_alive(law, alive) == BASE_OK);
   for (int step = 0; step < 10; step++) {
     const double dt = step % 4 == 0 ? 0.0 : time_step; /* 0: the present state is asked */
@@ -37,7 +37,7 @@ static void new_tags_and_gone_tags_leave_the_others_alone(void **state) {
   RveLaw *law;
   RveLawTotals totals;
   CHECK_ALL(truth_create(&scene, &truth) == BASE_OK);
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, RVE_BACKEND_CPU, &law) == BASE_OK);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, help_backend(), &law) == BASE_OK);
   for (int k = 0; k < next; k++) alive[k] = 1;
   /* One tag more per step, which nobody announces, often enough that batches must be merged; every third step one
    * goes. */
@@ -66,7 +66,7 @@ static void a_tag_that_comes_back_starts_from_its_packing(void **state) {
   int alive[TAGS];
   RveLaw *law;
   all_alive(alive);
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, RVE_BACKEND_CPU, &law) == BASE_OK);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, help_backend(), &law) == BASE_OK);
   CHECK_ALL(law_step(law, MPI_COMM_WORLD, alive, 1, time_step, 0, first) == BASE_OK);
   CHECK_ALL(rve_law_assign(law, 0, NULL) == BASE_OK);
   CHECK_ALL(law_step(law, MPI_COMM_WORLD, alive, 1, time_step, 0, again) == BASE_OK);
@@ -121,9 +121,9 @@ static void bad_scenes_and_packings_are_refused_on_all_ranks(void **state) {
   (void)state;
   RveScene scene = make_scene();
   RveLaw *law;
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, 0, RVE_BACKEND_CPU, &law) == BASE_ERROR_ARGUMENT && !law);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, 0, help_backend(), &law) == BASE_ERROR_ARGUMENT && !law);
   scene.dimension = 5;
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, 1, RVE_BACKEND_CPU, &law) == BASE_ERROR_ARGUMENT && !law);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, 1, help_backend(), &law) == BASE_ERROR_ARGUMENT && !law);
 }
 
 static void a_view_reaches_rank_0_from_any_owner(void **state) {

@@ -32,7 +32,7 @@ static void a_restart_on_other_ranks_continues_bit_for_bit(void **state) {
 
   /* The ranks fall into two groups (of 2 + 2, 2 + 1, 1 + 1, 1 ranks), each continues the whole of it. */
   MPI_Comm_split(MPI_COMM_WORLD, mpi_test_rank() < (mpi_test_ranks() + 1) / 2, 0, &half);
-  CHECK_ALL(rve_law_create(half, &scene, packing, PACKINGS, RVE_BACKEND_CPU, &second) == BASE_OK);
+  CHECK_ALL(rve_law_create(half, &scene, packing, PACKINGS, help_backend(), &second) == BASE_OK);
   CHECK_ALL(rve_law_unpack(second, bytes, size) == BASE_OK);
   CHECK_ALL(law_step(second, half, alive, 5, 0.0, 0, resumed) == BASE_OK);
   int good = 1; /* dt = 0: heat is per step and not asked here */
@@ -116,11 +116,11 @@ static void altered_truncated_and_foreign_records_are_refused_on_all_ranks(void 
   CHECK_ALL(is_refused(law, bytes, last ? size - 8 : size, "truncated"));
 
   RveScene scene = make_scene();
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing + 1, PACKINGS - 1, RVE_BACKEND_CPU, &other) == BASE_OK);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing + 1, PACKINGS - 1, help_backend(), &other) == BASE_OK);
   CHECK_ALL(is_refused(other, bytes, size, "packings"));
   rve_law_destroy(other);
   scene.thermal = 0;
-  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, RVE_BACKEND_CPU, &other) == BASE_OK);
+  CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, help_backend(), &other) == BASE_OK);
   CHECK_ALL(is_refused(other, bytes, size, "thermal"));
   rve_law_destroy(other);
 

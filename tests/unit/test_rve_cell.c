@@ -123,7 +123,7 @@ static void no_periodic_image_is_missed(void **state) {
       RveBatch *batch;
       int *identity = malloc((size_t)n[d] * sizeof *identity);
       for (int k = 0; k < n[d]; k++) identity[k] = k;
-      MUST(rve_batch_create(&scene, packings[d], n[d], identity, n[d], RVE_BACKEND_CPU, &batch));
+      MUST(rve_batch_create(&scene, packings[d], n[d], identity, n[d], help_backend(), &batch));
       for (int k = 0; k < n[d]; k++) {
         RveView view;
         MUST(rve_batch_view(batch, k, &view));

@@ -30,7 +30,7 @@ static void run_all(const RvePacking packings[2], int dim, int threads, int chun
   RveBatch *batch;
   scene.threads = threads;
   for (int k = 0; k < RVES; k++) which[k] = k % 2;
-  MUST(rve_batch_create(&scene, packings, 2, which, RVES, RVE_BACKEND_CPU, &batch));
+  MUST(rve_batch_create(&scene, packings, 2, which, RVES, help_backend(), &batch));
   for (int call = 0; call < CALLS; call++)
     for (int start = 0; start < RVES; start += chunk) {
       int index[RVES], n = 0;
@@ -90,7 +90,7 @@ static void a_restored_rve_continues_bit_for_bit(void **state) {
       MUST(rve_batch_step(batch, 1, NULL, &input, 5e-4, &answer));
     }
     void *bytes = pack(batch, 0, &size);
-    MUST(rve_batch_create(&scene, &packing, 1, NULL, 3, RVE_BACKEND_CPU, &other));
+    MUST(rve_batch_create(&scene, &packing, 1, NULL, 3, help_backend(), &other));
     MUST(rve_batch_unpack(other, two, bytes, size));
     const RveInput still = {{0.0}, 0.0};
     MUST(rve_batch_step(other, 1, &two, &still, 0.0, &again));
@@ -140,8 +140,9 @@ static void altered_truncated_and_foreign_states_are_refused(void **state) {
 
 static RveBatch *batch_on(const char *isa, const RveScene *scene, const RvePacking *packing, int *there) {
   char name[32];
+  RveBatch *batch;
   setenv("DEMPM_ISA", isa, 1);
-  RveBatch *batch = help_batch(scene, packing);
+  MUST(rve_batch_create(scene, packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch));
   unsetenv("DEMPM_ISA");
   snprintf(name, sizeof name, "cpu/%s", isa);
   *there = strcmp(rve_batch_backend_name(batch), name) == 0; /* else the machine lacks it */
@@ -284,10 +285,10 @@ static void wrong_calls_are_refused(void **state) {
   assert_int_equal(rve_batch_install_bonds(batch, 0, NULL), BASE_ERROR_ARGUMENT);
   other.dimension = 3, other.grain = RVE_SPHERE;
   assert_int_equal(rve_batch_set_scene(batch, &other), BASE_ERROR_ARGUMENT);
-  assert_int_equal(rve_batch_create(&other, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &none), BASE_ERROR_ARGUMENT);
+  assert_int_equal(rve_batch_create(&other, &packing, 1, NULL, 1, help_backend(), &none), BASE_ERROR_ARGUMENT);
   assert_null(none);
-  assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 0, RVE_BACKEND_CPU, &none), BASE_ERROR_ARGUMENT);
-  assert_int_equal(rve_batch_create(&scene, &packing, 1, &wrong_packing, 1, RVE_BACKEND_CPU, &none),
+  assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 0, help_backend(), &none), BASE_ERROR_ARGUMENT);
+  assert_int_equal(rve_batch_create(&scene, &packing, 1, &wrong_packing, 1, help_backend(), &none),
                    BASE_ERROR_ARGUMENT);
   rve_batch_destroy(NULL);
   rve_batch_destroy(batch);
@@ -302,17 +303,17 @@ static void wrong_packings_are_refused(void **state) {
     RvePacking packing = help_crystal(HELP_SQUARE, 3, 5e-3, 0.01);
     RveBatch *batch;
     packing.radius[4] = wrong[k];
-    assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch), BASE_ERROR_ARGUMENT);
+    assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 1, help_backend(), &batch), BASE_ERROR_ARGUMENT);
     assert_null(batch);
     rve_packing_destroy(&packing);
   }
   RvePacking packing = help_crystal(HELP_SQUARE, 3, 5e-3, 0.01);
   RveBatch *batch;
   packing.position[3] = NAN;
-  assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch), BASE_ERROR_ARGUMENT);
+  assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 1, help_backend(), &batch), BASE_ERROR_ARGUMENT);
   packing.position[3] = 0.0;
   packing.cell[0] = 0.0;
-  assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch), BASE_ERROR_ARGUMENT);
+  assert_int_equal(rve_batch_create(&scene, &packing, 1, NULL, 1, help_backend(), &batch), BASE_ERROR_ARGUMENT);
   rve_packing_destroy(&packing);
 }
 
@@ -343,7 +344,7 @@ static void twins_are_computed_once(void **state) {
   scene.bonds = 1, scene.bond_strength = 1e-4;
   for (int share = 0; share < 2; share++) {
     scene.share = share;
-    MUST(rve_batch_create(&scene, packings, 2, packing_of, COUNT, RVE_BACKEND_CPU, &batch[share]));
+    MUST(rve_batch_create(&scene, packings, 2, packing_of, COUNT, help_backend(), &batch[share]));
   }
   for (int call = 0; call < 12; call++) {
     RveAnswer answer[2][COUNT];

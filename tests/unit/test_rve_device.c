@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* The device beside the CPU: same packings, same calls. Without a device (a real one, or its source on the host:
+ * tests/cuda_host) there is nothing to compare, and the tests say so. */
+#include "rve_help.h"
+
+enum { SIZES = 3, RVES = 5, CALLS = 3 };
+typedef enum Physics { FRICTIONLESS, FRICTION, DASHPOTS, BONDS, PHYSICS } Physics;
+
+#define NEED_A_DEVICE()          \
+  do {                           \
+    if (!rve_device_present()) { \
+      print_message("           no device\n"); \
+      skip();                    \
+    }                            \
+  } while (0)
+
+static RveScene scene_of(int dimension, Physics physics) {
+  RveScene scene = help_scene(dimension);
+  help_heat(&scene);
+  if (physics >= FRICTION) scene.tangential_stiffness = 8e5;
+  if (physics == FRICTION) scene.local_damping = 0.2;
+  if (physics == DASHPOTS) scene.critical_damping = 0.2;
+  if (physics == BONDS) scene.bonds = 1, scene.bond_strength = 1e-2, scene.bond_shear_ratio = 0.5, scene.bond_melting_temperature = 200.0;
+  return scene;
+}
+
+/* Packings of several sizes, so that RVEs have one to three warps. */
+static void make_packings(int dimension, RvePacking packing[SIZES]) {
+  const int per_side[2][SIZES] = {{5, 7, 9}, {3, 4, 4}};
+  for (int k = 0; k < SIZES; k++)
+    packing[k] = help_random(dimension, per_side[dimension - 2][k], dimension == 2 ? 2e4 : 1e5, 70 + (uint64_t)k);
+}
+
+static RveBatch *make_batch(const RveScene *scene, const RvePacking packing[SIZES], RveBackend backend) {
+  const int which[RVES] = {2, 0, 1, 0, 2};
+  RveBatch *batch;
+  MUST(rve_batch_create(scene, packing, SIZES, which, RVES, backend, &batch));
+  if (scene->bonds) MUST(rve_batch_install_bonds(batch, 0, NULL));
+  return batch;
+}
+
+/* A shear that turns round, with compression and heating; every RVE another. */
+static void run_calls(RveBatch *batch, const RveScene *scene, int first, int calls, RveAnswer answer[RVES]) {
+  for (int call = first; call < first + calls; call++) {
+    RveInput input[RVES];
+    memset(input, 0, sizeof input);
+    for (int k = 0; k < RVES; k++) {
+      double *rate = input[k].velocity_gradient;
+      rate[1] = (call % 2 ? -30.0 : 60.0) + k, rate[0] = -5.0 * k, rate[3] = 4.0;
+      if (scene->dimension == 3) rate[5] = 20.0, rate[8] = -3.0;
+      input[k].temperature = 25.0 * call + k;
+    }
+    MUST(rve_batch_step(batch, RVES, NULL, input, 4e-4, answer));
+  }
+}
+
+/* Largest deviation of the answers, over the largest entry of their kind. */
+static double deviation(const double *a, const double *b, int n) {
+  double size = 0.0, apart = 0.0;
+  for (int m = 0; m < n; m++) size = fmax(size, fabs(b[m])), apart = fmax(apart, fabs(a[m] - b[m]));
+  return size > 0.0 ? apart / size : apart;
+}
+
+static double difference(const RveAnswer *a, const RveAnswer *b) {
+  double worst = 0.0;
+  worst = fmax(worst, deviation(a->stress, b->stress, 6));
+  worst = fmax(worst, deviation(a->conductivity, b->conductivity, 6));
+  worst = fmax(worst, deviation(a->fabric, b->fabric, 6));
+  worst = fmax(worst, deviation(&a->friction_work, &b->friction_work, 1));
+  worst = fmax(worst, deviation(&a->damping_work, &b->damping_work, 1));
+  worst = fmax(worst, deviation(&a->kinetic_energy, &b->kinetic_energy, 1));
+  worst = fmax(worst, deviation(&a->elastic_energy, &b->elastic_energy, 1));
+  worst = fmax(worst, deviation(&a->modulus, &b->modulus, 1));
+  worst = fmax(worst, deviation(&a->solid_fraction, &b->solid_fraction, 1));
+  assert_float_equal(a->coordination, b->coordination, 1e-12);
+  assert_float_equal(a->bond_fraction, b->bond_fraction, 1e-12);
+  assert_true(a->steps == b->steps && a->status == b->status);
+  return worst;
+}
+
+static void the_device_answers_as_the_cpu_does(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  for (int dimension = 2; dimension <= 3; dimension++) {
+    RvePacking packing[SIZES];
+    make_packings(dimension, packing);
+    for (Physics physics = FRICTIONLESS; physics < PHYSICS; physics++) {
+      const RveScene scene = scene_of(dimension, physics);
+      RveBatch *here = make_batch(&scene, packing, RVE_BACKEND_CPU), *there = make_batch(&scene, packing, RVE_BACKEND_CUDA);
+      RveAnswer expected[RVES], found[RVES];
+      double worst = 0.0;
+      run_calls(here, &scene, 0, CALLS, expected);
+      run_calls(there, &scene, 0, CALLS, found);
+      for (int k = 0; k < RVES; k++) worst = fmax(worst, difference(&found[k], &expected[k]));
+      print_message("           %dD, physics %d: %d steps, largest deviation %.1e, bonds %.2f\n", dimension, (int)physics,
+                    (int)found[0].steps, worst, found[0].bond_fraction);
+      assert_true(found[0].steps > 20 && expected[0].stress[0] < 0.0);
+      assert_true(physics == FRICTIONLESS || expected[0].friction_work > 0.0);
+      assert_true(worst < 1e-9); /* sums in another order; collisions make more of it with every step */
+      rve_batch_destroy(here);
+      rve_batch_destroy(there);
+    }
+    for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
+  }
+}
+
+/* FNV-1a of all answers, so that two runs of this program can be compared. */
+static uint64_t digest(const RveAnswer answer[RVES]) {
+  uint64_t sum = 14695981039346656037u;
+  for (size_t m = 0; m < RVES * sizeof *answer; m++) sum = (sum ^ ((const unsigned char *)answer)[m]) * 1099511628211u;
+  return sum;
+}
+
+static uint64_t digest_of_run(int dimension, Physics physics) {
+  RvePacking packing[SIZES];
+  RveAnswer answer[RVES];
+  const RveScene scene = scene_of(dimension, physics);
+  make_packings(dimension, packing);
+  RveBatch *batch = make_batch(&scene, packing, RVE_BACKEND_CUDA);
+  memset(answer, 0, sizeof answer);
+  run_calls(batch, &scene, 0, CALLS, answer);
+  rve_batch_destroy(batch);
+  for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
+  return digest(answer);
+}
+
+/* On the host two settings of the stand-in can be asked for: no shared memory, and little memory for lists; a device ignores them. */
+static void answers_do_not_depend_on_where_states_lie(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  for (int dimension = 2; dimension <= 3; dimension++) {
+    const Physics physics = dimension == 2 ? BONDS : FRICTION;
+    const uint64_t first = digest_of_run(dimension, physics), again = digest_of_run(dimension, physics);
+    setenv("DEMPM_CUDA_HOST_SHARED", "20000", 1); /* the smallest packing fits, the others do not */
+    const uint64_t outside = digest_of_run(dimension, physics);
+    unsetenv("DEMPM_CUDA_HOST_SHARED");
+    setenv("DEMPM_CUDA_HOST_MEMORY", "200000", 1); /* not enough for the lists of all RVEs at once */
+    const uint64_t parts = digest_of_run(dimension, physics);
+    unsetenv("DEMPM_CUDA_HOST_MEMORY");
+    print_message("           %dD: answers %016llx\n", dimension, (unsigned long long)first);
+    assert_true(again == first);
+    assert_true(outside == first);
+    assert_true(parts == first);
+  }
+}
+
+static void states_move_between_device_and_cpu(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  RvePacking packing[SIZES];
+  RveAnswer stayed[RVES], moved[RVES];
+  const RveScene scene = scene_of(2, DASHPOTS);
+  make_packings(2, packing);
+  RveBatch *here = make_batch(&scene, packing, RVE_BACKEND_CPU), *there = make_batch(&scene, packing, RVE_BACKEND_CUDA);
+  run_calls(there, &scene, 0, CALLS, stayed);
+  for (int k = 0; k < RVES; k++) {
+    void *bytes;
+    size_t written;
+    MUST(base_alloc(rve_batch_state_bytes(there, k), 1, &bytes));
+    MUST(rve_batch_pack(there, k, bytes, &written));
+    MUST(rve_batch_unpack(here, k, bytes, written));
+    base_free(bytes);
+  }
+  run_calls(there, &scene, CALLS, 1, stayed);
+  run_calls(here, &scene, CALLS, 1, moved);
+  for (int k = 0; k < RVES; k++) assert_true(difference(&moved[k], &stayed[k]) < 1e-9);
+  rve_batch_destroy(here);
+  rve_batch_destroy(there);
+  for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(the_device_answers_as_the_cpu_does),
+      cmocka_unit_test(answers_do_not_depend_on_where_states_lie),
+      cmocka_unit_test(states_move_between_device_and_cpu),
+  };
+  return cmocka_run_group_tests_name("device", tests, NULL, NULL);
+}
