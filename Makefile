@@ -18,7 +18,7 @@ ROUNDS ?= 5#                       of make bench
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-PHONY := all demo test test-unit test-scenes test-gpu bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
+PHONY := all demo test test-unit test-scenes test-gpu test-cuda-host bench bench-gpu bench-peers-native sanitize fuzz run-fuzzers \
          check-cuda install clean help deps programs validate validate-thermal verify verify-full cost coupled-cost coupled-stability \
          compare FORCE
 
@@ -261,6 +261,7 @@ help:
 	@echo "make coupled-cost error against processor time of rod, heated_square and biaxial (doc/verification.md), 12 minutes; CASES=rod"
 	@echo "make coupled-stability   time step against PIC fraction, shear to 10, a settled column for a million steps; 6 minutes"
 	@echo "make compare      multiscale against full DEM, error beside seconds (doc/comparison.md), an hour of one core; QUICK=1: a minute; CASES=bed"
+	@echo "make test-cuda-host   all tests of the packings with the CUDA source on the host, a fiber for each thread; half an hour"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
 	@echo "make deps         installs missing Debian packages (every target does; DEPS=no refuses instead)"
