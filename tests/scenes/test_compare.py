@@ -27,6 +27,8 @@ def test_both_sides_answer(case, tmp_path):
     quantity, bound = CASES[case]
     assert errors[quantity] < bound, errors
     assert all(row["seconds_multiscale"] > 0 and row["seconds_full_dem"] > 0 for row in comparison.rows)
+    log, = comparison.folder.glob("multiscale*/log.liggghts")
+    assert re.search(r"packing( rve_16_\d\.packing){4} ", log.read_text())  # points take four packings in turn
 
 
 @pytest.mark.parametrize("folder", ["bed", "biaxial", "column"])
