@@ -26,6 +26,7 @@ namespace LAMMPS_NS {
  *       [origin x y z] [order usf|usl|musl] [thermal yes|no] [temperature T0] [mechanics yes|no]
  *       [damping/point A] [damping/grid A] [point/size LX LY [LZ]] [timestep/check yes|no]
  *       [leaving error|delete] [density/bulk RHO] [threads N] [thermal/every N|auto E]
+ *       [volumetric point|cell] [follow WALL ...]
  *   fix_modify ID damping/point A
  *   fix_modify ID damping/grid A             (from the next run on)
  *
