@@ -260,7 +260,7 @@ help:
 	@echo "make cost         error against cost for sizes, rates, damping of packings (doc/performance.md), 20 minutes; QUICK=1: half a minute"
 	@echo "make coupled-cost error against processor time of rod, heated_square and biaxial (doc/verification.md), 12 minutes; CASES=rod"
 	@echo "make coupled-stability   time step against PIC fraction, shear to 10, a settled column for a million steps; 6 minutes"
-	@echo "make compare      multiscale against full DEM, error beside seconds (doc/comparison.md), an hour of one core; QUICK=1: a minute; CASES=bed"
+	@echo "make compare      multiscale against full DEM, error beside seconds (doc/comparison.md), an hour and a half of one core; QUICK=1: a minute; CASES=bed"
 	@echo "make test-cuda-host   all tests of the packings with the CUDA source on the host, a fiber for each thread; half an hour"
 	@echo "make check-cuda   compiles the CUDA sources with warnings as errors, when nvcc is found"
 	@echo "make install PREFIX=/usr/local"
