@@ -42,8 +42,6 @@ void rve_device_destroy(RveDevice *device);
 /* (Re)places RVE k's arena on the device by a copy of the host's `arena`. */
 BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts, size_t bytes, const void *arena);
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena);
-/* RVE `to` becomes what RVE `from` is, on the device. */
-BaseStatus rve_device_copy(RveDevice *device, int from, int to);
 /* Runs and measures all jobs. */
 BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count);
 

@@ -175,7 +175,13 @@ void rve_device_destroy(RveDevice *device) {
   base_free(device);
 }
 
-static BaseStatus reserve_arena(DeviceArena *to, const RveCounts *counts, size_t bytes) {
+BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts, size_t bytes, const void *arena) {
+  if (rve >= device->count) {
+    const int count = rve + 1 > 2 * device->count ? rve + 1 : 2 * device->count;
+    TRY(BASE_GROW((size_t)device->count, (size_t)count, &device->arena));
+    device->count = count;
+  }
+  DeviceArena *to = &device->arena[rve];
   if (to->room < bytes) {
     cudaFree(to->arena);
     to->arena = NULL, to->room = 0;
@@ -184,29 +190,12 @@ static BaseStatus reserve_arena(DeviceArena *to, const RveCounts *counts, size_t
   }
   to->counts = *counts;
   to->bytes = bytes;
-  return BASE_OK;
-}
-
-BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts, size_t bytes, const void *arena) {
-  if (rve >= device->count) {
-    const int count = rve + 1 > 2 * device->count ? rve + 1 : 2 * device->count;
-    TRY(BASE_GROW((size_t)device->count, (size_t)count, &device->arena));
-    device->count = count;
-  }
-  TRY(reserve_arena(&device->arena[rve], counts, bytes));
-  return checked(cudaMemcpy(device->arena[rve].arena, arena, bytes, cudaMemcpyHostToDevice), "copying an RVE to the device");
+  return checked(cudaMemcpy(to->arena, arena, bytes, cudaMemcpyHostToDevice), "copying an RVE to the device");
 }
 
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
   const DeviceArena *from = &device->arena[rve];
   return checked(cudaMemcpy(arena, from->arena, from->bytes, cudaMemcpyDeviceToHost), "copying an RVE from the device");
-}
-
-BaseStatus rve_device_copy(RveDevice *device, int from, int to) {
-  const DeviceArena *model = &device->arena[from];
-  TRY(reserve_arena(&device->arena[to], &model->counts, model->bytes));
-  return checked(cudaMemcpy(device->arena[to].arena, model->arena, model->bytes, cudaMemcpyDeviceToDevice),
-                 "copying an RVE on the device");
 }
 
 static BaseStatus reserve_jobs(RveDevice *device, int count) {

@@ -356,27 +356,11 @@ static BaseStatus device_refresh(RveBatch *batch, int n, const int *index) {
   return run_jobs(batch, count);
 }
 
-/* As host_step(): the first of each set of twins, then copies of it; a twin of one that failed fails by itself. */
+/* Twins are not copied there: a copy's own call takes longer than a device takes for the steps. */
 static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
-  rve_twins_sort(batch, n, index, input);
-  for (int followers = 0; followers < 2; followers++) {
-    int count = 0;
-    for (int k = 0; k < n; k++) {
-      const RveTwin *twin = &batch->twin[k];
-      const int follows = twin->leader != twin->rve;
-      if (follows != followers) continue;
-      if (follows && batch->record[twin->leader].last.status == BASE_OK) {
-        TRY(rve_device_copy(batch->device, twin->leader, twin->rve));
-        TRY(rve_twins_copy(batch, twin->leader, twin->rve));
-        batch->shared += duration > 0.0;
-      } else {
-        TRY(add_job(batch, twin->rve, twin->input, duration, &count));
-      }
-    }
-    TRY(run_jobs(batch, count));
-  }
-  rve_twins_renew(batch, n);
-  return BASE_OK;
+  int count = 0;
+  for (int k = 0; k < n; k++) TRY(add_job(batch, index ? index[k] : k, &input[k], duration, &count));
+  return run_jobs(batch, count);
 }
 
 /* Threads take the RVEs in turns, more or less. */

@@ -31,9 +31,10 @@ typedef struct RveFailed {
 typedef struct RveTwin {
   uint64_t history;
   const RveInput *input;
-  int rve, leader;   /* leader: the first of its kind */
-  const char *arena; /* its state as the call begins, of `bytes`: to be fetched into the cache only, as the thread that */
-  size_t bytes;      /* runs it may replace the arena meanwhile */
+  int rve, leader; /* leader: the first of its kind */
+  /* Its state as the call begins. Another thread may replace it meanwhile: for fetching into the cache only. */
+  const char *arena;
+  size_t bytes;
 } RveTwin;
 
 struct RveBatch {

@@ -24,10 +24,6 @@ BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
   (void)device, (void)rve, (void)arena;
   return absent();
 }
-BaseStatus rve_device_copy(RveDevice *device, int from, int to) {
-  (void)device, (void)from, (void)to;
-  return absent();
-}
 BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count) {
   (void)device, (void)features, (void)jobs, (void)count;
   return absent();

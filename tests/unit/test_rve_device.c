@@ -124,7 +124,8 @@ static uint64_t digest_of_run(int dimension, Physics physics) {
   return digest(answer);
 }
 
-/* On the host two settings of the stand-in can be asked for: no shared memory, and little memory for lists; a device ignores them. */
+/* On the host settings of the stand-in can be asked for: little shared memory, little memory for lists, two devices. A device ignores
+ * them. */
 static void answers_do_not_depend_on_where_states_lie(void **state) {
   (void)state;
   NEED_A_DEVICE();
@@ -137,10 +138,16 @@ static void answers_do_not_depend_on_where_states_lie(void **state) {
     setenv("DEMPM_CUDA_HOST_MEMORY", "200000", 1); /* not enough for the lists of all RVEs at once */
     const uint64_t parts = digest_of_run(dimension, physics);
     unsetenv("DEMPM_CUDA_HOST_MEMORY");
+    setenv("DEMPM_CUDA_HOST_DEVICES", "2", 1);
+    rve_device_share(3); /* the second of two */
+    const uint64_t second = digest_of_run(dimension, physics);
+    rve_device_share(0);
+    unsetenv("DEMPM_CUDA_HOST_DEVICES");
     print_message("           %dD: answers %016llx\n", dimension, (unsigned long long)first);
     assert_true(again == first);
     assert_true(outside == first);
     assert_true(parts == first);
+    assert_true(second == first);
   }
 }
 
