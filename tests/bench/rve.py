@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Times one RVE job in every DEM code at hand and writes rve.json and rve.png; see doc/performance.md.
 
-  rve.py BUILD [--rounds N] [--core N] [--codes NAME,...] [--gpu]
+  rve.py BUILD [--rounds N] [--until TIME] [--core N] [--codes NAME,...] [--gpu]
+
+After three rounds none is begun that would not end before TIME (seconds since 1970).
 
 Exit code 1 if the codes do not end at the same stresses: then they have not done the same job, and no ratio counts.
 """
@@ -23,6 +25,7 @@ import time
 import codes
 
 TOLERANCE = 0.04  # of an end stress, from the median of all codes: 400 grains part ways after 20,000 steps
+FEWEST_ROUNDS = 3  # of which a median can be taken, whatever the time
 TUNING_STEPS, TUNING_TRIES = 4000, 2  # the same for all codes
 # Floating-point operations and bytes moved per particle-step, a + b * slots; counted from the kernels' source in
 # doc/performance.md, and to be counted anew when they change.
@@ -99,6 +102,19 @@ class Bench:
                               "particle_steps_per_second": rate, **result})
             self.say(f"  round {number}  {dimension}D  {code.label:16} {1e-6 * rate:7.2f} million particle-steps/s   "
                      f"sxx {result['sxx']:.5g} syy {result['syy']:.5g}   others' load {result['foreign_seconds']:.1f} s")
+
+    def take_turns(self, until):
+        """Up to as many rounds as asked; a round lasts as long as the longest one before, for all that is known."""
+        longest = 0.0
+        for number in range(1, self.rounds + 1):
+            start = time.time()
+            if number > FEWEST_ROUNDS and start + longest > until:
+                self.say(f"  {number - 1} rounds of {self.rounds}: another one would take more time than there is")
+                self.rounds = number - 1
+                return
+            for dimension in (2, 3):
+                self.round(dimension, number)
+            longest = max(longest, time.time() - start)
 
     def rates(self, name, dimension):
         return [run["particle_steps_per_second"] for run in self.runs
@@ -230,6 +246,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--until", type=float, default=float("inf"))
     parser.add_argument("--core", type=int, default=max(os.sched_getaffinity(0)))
     parser.add_argument("--codes", type=lambda names: names.split(","), default=[])
     parser.add_argument("--gpu", action="store_true")
@@ -240,15 +257,14 @@ def main():
         return gpu(build, folder)
     bench = Bench(build, arguments.core, arguments.rounds, arguments.codes)
     result = {"date": datetime.datetime.now().isoformat(timespec="seconds"), "machine": machine(build),
-              "versions": versions(), "rounds": bench.rounds, "core": bench.core}
+              "versions": versions(), "core": bench.core}
+    scaling, skipping = bench.scaling(), bench.skipping()
     for dimension in (2, 3):
         bench.tune(dimension)
-    for number in range(1, bench.rounds + 1):
-        for dimension in (2, 3):
-            bench.round(dimension, number)
+    bench.take_turns(arguments.until)
+    result["rounds"] = bench.rounds
     table = bench.summary()
     labels = {code.name: code.label for code in bench.codes}
-    scaling, skipping = bench.scaling(), bench.skipping()
     result["ratios"] = ratios(table, "dempm")
     result["ratios_dashpots"] = ratios(table, "dempm_dashpots")
     result["ratios_mixed"] = ratios(table, "dempm_mixed")
