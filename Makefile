@@ -12,7 +12,8 @@ OPT ?= -O3 -g
 WERROR ?=#                         -Werror in .ci/run
 SANITIZE ?=
 DEPS ?= yes
-ROUNDS ?= 5#                       of make bench
+ROUNDS ?= 5#                       of make bench, at most
+BENCH_SECONDS ?= 540#              of make bench; three rounds are run in any case
 
 .DEFAULT_GOAL := all
 .DELETE_ON_ERROR:
@@ -131,7 +132,7 @@ $(BUILD)/tests/%: tests/unit/%.cpp $(LIBRARY)
 	$(SHOW) $(MPICXX) $(CXX_FLAGS) -Isrc $< $(LIBRARY) -lcmocka $(ALL_LIBS) -o $@
 $(BUILD)/bench/%: tests/bench/%.c $(BENCH_OBJECTS) $(LIBRARY)
 	@mkdir -p $(@D)
-	$(SHOW) $(CC) $(C_FLAGS) -Isrc $^ $(C_LIBS) -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $(filter %.c %.o %.a,$^) $(C_LIBS) -o $@
 $(BUILD)/bench/isa/%.o: tests/bench/isa.c $(READY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -Isrc -c $< -o $@
@@ -141,8 +142,12 @@ $(BUILD)/cuda_host/device.o: src/cuda_rve/rve_backend_cuda.cu tests/cuda_host/cu
 	@mkdir -p $(@D)
 	$(SHOW) $(CXX) -x c++ -std=c++17 -Wall -Wextra -Wno-unknown-pragmas $(WERROR) $(OPT) $(FUSE) -fno-extern-tls-init -MMD -MP \
 	  -D__CUDACC__ -DDEMPM_CUDA -Itests/cuda_host -c $< -o $@
+$(BUILD)/cuda_host/test_mpi_%: tests/unit/test_mpi_%.c $(BUILD)/cuda_host/device.o $(LIBRARY)
+	$(SHOW) $(MPICC) $(C_FLAGS) -Isrc $(filter %.c %.o %.a,$^) -lcmocka $(C_LIBS) -lstdc++ -o $@
 $(BUILD)/cuda_host/%: tests/unit/%.c $(BUILD)/cuda_host/device.o $(LIBRARY)
-	$(SHOW) $(CC) $(C_FLAGS) -Isrc $^ -lcmocka $(C_LIBS) -lstdc++ -o $@
+	$(SHOW) $(CC) $(C_FLAGS) -Isrc $(filter %.c %.o %.a,$^) -lcmocka $(C_LIBS) -lstdc++ -o $@
+$(BUILD)/cuda_host/dempm: $(BUILD)/fix_mpm_couple/main.o $(BUILD)/cuda_host/device.o $(LIBRARY)
+	$(SHOW) $(MPICXX) $(SANITIZE) -fopenmp $^ $(ALL_LIBS) -o $@
 $(BUILD)/tools/%: tests/tools/%.c $(LIBRARY)
 	@mkdir -p $(@D)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $< $(LIBRARY) $(C_LIBS) -o $@
@@ -156,7 +161,7 @@ $(BUILD)/fuzz/%: tests/fuzz/%.c $(LIBRARY)
 RUN_ENV = DEMPM_BUILD=$(abspath $(BUILD)) MPIRUN=$(MPIRUN) PYTHON=$(PYTHON)
 PYTEST = $(RUN_ENV) $(PYTHON) -m pytest -q -p no:cacheprovider
 
-test: programs $(TESTS) $(TOOLS) $(BUILD)/cuda_host/test_rve_device
+test: programs $(TESTS) $(TOOLS) $(addprefix $(BUILD)/cuda_host/,test_rve_device test_mpi_device dempm)
 	$(PYTEST) tests
 test-unit: $(TESTS)
 	$(PYTEST) tests/test_unit.py
@@ -176,9 +181,9 @@ fuzz:
 run-fuzzers: $(FUZZERS)
 	$(foreach f,$(FUZZERS),DEMPM_TEST_DATA=tests/data $(f) &&) true
 bench: programs $(BENCHES) $(BUILD)/peers
-	$(BUILD)/bench/bench_rve cpu
-	OMP_PROC_BIND=true $(BUILD)/bench/bench_mpm cpu $(BUILD)/bench/mpm.json $(ROUNDS)
-	$(PYTHON) tests/bench/rve.py $(BUILD) --rounds $(ROUNDS)
+	until=$$(($$(date +%s) + $(BENCH_SECONDS))) && $(BUILD)/bench/bench_rve cpu && \
+	OMP_PROC_BIND=true $(BUILD)/bench/bench_mpm cpu $(BUILD)/bench/mpm.json $(ROUNDS) && \
+	$(PYTHON) tests/bench/rve.py $(BUILD) --rounds $(ROUNDS) --until $$until
 bench-gpu: programs $(BENCHES)
 	$(BUILD)/bench/bench_rve cuda
 	$(PYTHON) tests/bench/rve.py $(BUILD) --gpu
@@ -250,7 +255,7 @@ help:
 	@echo "make              build/dempm, build/dempm-pack and build/dempm-rve"
 	@echo "make demo         the collapse of a granular column; pictures in examples/column_collapse/out"
 	@echo "make test         unit tests and scenes (test-unit, test-scenes: one of them; test-gpu: on a GPU)"
-	@echo "make bench        timings, also of LIGGGHTS, LAMMPS and YADE with the same job (bench-gpu: on a GPU; ROUNDS=5)"
+	@echo "make bench        timings, also of LIGGGHTS, LAMMPS and YADE with the same job (bench-gpu: on a GPU; ROUNDS=5 BENCH_SECONDS=540)"
 	@echo "make bench-peers-native   LAMMPS compiled for this machine, for make bench to compare with"
 	@echo "make sanitize     unit tests under the address and undefined-behaviour sanitizers"
 	@echo "make fuzz         mutated packing files under the sanitizers"

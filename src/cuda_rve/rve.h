@@ -142,13 +142,17 @@ int rve_device_present(void);
 void rve_device_share(int process);
 
 /* Creates `count` RVEs; RVE k is a copy of packings[packing_of_rve[k]] (NULL: all of packings[0]).
- * Copies what it needs; borrows nothing. BASE_ERROR_ARGUMENT, BASE_ERROR_MEMORY, BASE_ERROR_DEVICE. */
+ * Copies what it needs; borrows nothing. A device whose memory is too small, now or later, loses the batch to the CPU
+ * (rve_batch_is_on_device). BASE_ERROR_ARGUMENT, BASE_ERROR_MEMORY, BASE_ERROR_DEVICE. */
 BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, int packing_count,
                             const int *packing_of_rve, int count, RveBackend backend, RveBatch **batch);
 void rve_batch_destroy(RveBatch *batch); /* accepts NULL */
 int rve_batch_count(const RveBatch *batch);
 enum { RVE_BACKEND_BYTES = 24 }; /* room for a backend's name and its final zero */
 const char *rve_batch_backend_name(const RveBatch *batch); /* "cpu/avx512", "cpu/avx512_mixed", "cpu/avx2", "cpu/plain", "cuda" */
+int rve_batch_is_on_device(const RveBatch *batch);
+/* All RVEs go on on the CPU: the same states, other last bits. Nothing without a device. BASE_ERROR_MEMORY, BASE_ERROR_DEVICE: they stay. */
+BaseStatus rve_batch_leave_device(RveBatch *batch);
 const RveScene *rve_batch_scene(const RveBatch *batch);
 /* May change material parameters (friction, damping, substeps, bonds' strengths, threads, time step) between steps; refuses a change of
  * dimension, grain, stiffness sign, thermal or bonds flag. */

@@ -39,10 +39,11 @@ typedef struct RveDeviceJob {
 
 BaseStatus rve_device_create(const RveKernels **layout, RveDevice **device);
 void rve_device_destroy(RveDevice *device);
-/* (Re)places RVE k's arena on the device by a copy of the host's `arena`. */
+/* (Re)places RVE k's arena on the device by a copy of the host's `arena`. After an error the device has none. */
 BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts, size_t bytes, const void *arena);
+int rve_device_holds(const RveDevice *device, int rve); /* 1 if RVE k's arena is there */
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena);
-/* Runs and measures all jobs. */
+/* Runs and measures all jobs. BASE_ERROR_MEMORY: nothing has run. */
 BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob *jobs, int count);
 
 /* What an RVE remembers of its conductivity (rve_conduction.h). 8-byte members only: it is stored as it is. */
@@ -76,6 +77,9 @@ BaseStatus rve_record_pack(const RveRecord *record, uint64_t scene_hash, void *b
 /* *record is replaced on success only. *canonical = 1: another lane width, forces and list must be made anew. */
 BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, const void *bytes, size_t size,
                              RveRecord *record, int *canonical);
+/* *to: a new record with the state of `from` for other kernels. A call that was interrupted goes on where it stood; else
+ * forces and list must be made anew. */
+BaseStatus rve_record_convert(const RveKernels *kernels, const RveRecord *from, RveRecord *to);
 BaseStatus rve_record_view(const RveRecord *record, RveView *view);
 BaseStatus rve_record_packing(const RveRecord *record, RvePacking *packing);
 void rve_record_install_bonds(RveRecord *record);

@@ -185,13 +185,15 @@ BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts
   if (to->room < bytes) {
     cudaFree(to->arena);
     to->arena = NULL, to->room = 0;
-    TRY(checked(cudaMalloc((void **)&to->arena, bytes), "memory for an RVE (allowed without it: backend cpu)"));
+    TRY(checked(cudaMalloc((void **)&to->arena, bytes), "memory for an RVE"));
     to->room = bytes;
   }
   to->counts = *counts;
   to->bytes = bytes;
   return checked(cudaMemcpy(to->arena, arena, bytes, cudaMemcpyHostToDevice), "copying an RVE to the device");
 }
+
+int rve_device_holds(const RveDevice *device, int rve) { return rve < device->count && device->arena[rve].arena; }
 
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
   const DeviceArena *from = &device->arena[rve];
@@ -215,7 +217,7 @@ static BaseStatus reserve_scratch(RveDevice *device, int stream, size_t bytes) {
   TRY(checked(cudaStreamSynchronize(device->stream[stream]), "running RVEs"));
   cudaFree(device->scratch[stream]);
   device->scratch[stream] = NULL, device->scratch_bytes[stream] = 0;
-  TRY(checked(cudaMalloc((void **)&device->scratch[stream], bytes), "working memory for neighbour lists (allowed without it: backend cpu)"));
+  TRY(checked(cudaMalloc((void **)&device->scratch[stream], bytes), "working memory for neighbour lists"));
   device->scratch_bytes[stream] = bytes;
   return BASE_OK;
 }
@@ -254,16 +256,27 @@ static int find_end(const RveDevice *device, int first, int count) {
   return end;
 }
 
-static BaseStatus reserve_part(RveDevice *device, int stream, int first, int end) {
-  size_t scratch = 0;
-  for (int k = first; k < end; k++) scratch += scratch_bytes(&device->host[k]);
-  TRY(reserve_scratch(device, stream, scratch));
-  scratch = 0;
-  for (int k = first; k < end; k++) {
-    device->host[k].scratch = device->scratch[stream] + scratch;
-    scratch += scratch_bytes(&device->host[k]);
+static size_t part_bytes(const RveDevice *device, int first, int end) {
+  size_t bytes = 0;
+  for (int k = first; k < end; k++) bytes += scratch_bytes(&device->host[k]);
+  return bytes;
+}
+
+/* For the largest part of each stream. */
+static BaseStatus reserve_parts(RveDevice *device, int count) {
+  for (int first = 0, end, stream = 0; first < count; first = end, stream = (stream + 1) % STREAMS) {
+    end = find_end(device, first, count);
+    TRY(reserve_scratch(device, stream, part_bytes(device, first, end)));
   }
   return BASE_OK;
+}
+
+static void place_part(RveDevice *device, int stream, int first, int end) {
+  size_t bytes = 0;
+  for (int k = first; k < end; k++) {
+    device->host[k].scratch = device->scratch[stream] + bytes;
+    bytes += scratch_bytes(&device->host[k]);
+  }
 }
 
 /* To the device, through the kernel and back, while the other stream does the same with other jobs. */
@@ -286,13 +299,7 @@ static BaseStatus launch_part(RveDevice *device, RveFeatures features, int strea
 static BaseStatus launch_all(RveDevice *device, RveFeatures features, int count) {
   for (int first = 0, end, stream = 0; first < count; first = end, stream = (stream + 1) % STREAMS) {
     end = find_end(device, first, count);
-    BaseStatus status = reserve_part(device, stream, first, end);
-    while (status == BASE_ERROR_MEMORY && end - first > 1) { /* fewer at a time, from now on */
-      device->part = (end - first) / 2;
-      end = find_end(device, first, count);
-      status = reserve_part(device, stream, first, end);
-    }
-    TRY(status);
+    place_part(device, stream, first, end);
     TRY(launch_part(device, features, stream, first, end));
   }
   return BASE_OK;
@@ -302,7 +309,11 @@ BaseStatus rve_device_run(RveDevice *device, RveFeatures features, RveDeviceJob 
   TRY(checked(cudaSetDevice(device->id), "choosing the device"));
   TRY(reserve_jobs(device, count));
   fill_jobs(device, jobs, count);
-  const BaseStatus status = launch_all(device, features, count);
+  BaseStatus status;
+  while ((status = reserve_parts(device, count)) == BASE_ERROR_MEMORY && device->part > 1) /* fewer at a time, from now on */
+    device->part = (device->part < count ? device->part : count) / 2;
+  TRY(status);
+  status = launch_all(device, features, count);
   for (int k = 0; k < STREAMS; k++) TRY(checked(cudaStreamSynchronize(device->stream[k]), "running RVEs"));
   TRY(status);
   for (int k = 0; k < count; k++) jobs[device->host[k].place] = device->host[k].job;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Batches of RVEs: creation, stepping over threads or on the device. */
+/* Batches of RVEs: creation, stepping over threads. */
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 
 /* -------------------------------------------------------------------------------------------------- which kernels */
 
-static const RveKernels *choose_kernels(const RveScene *scene) {
+const RveKernels *rve_batch_host_kernels(const RveScene *scene) {
   const RveKernels *best = &rve_kernels_plain;
 #if defined(__x86_64__)
   const char *wanted = getenv("DEMPM_ISA");
@@ -39,7 +39,7 @@ static BaseStatus reserve(RveWorkspace *workspace, const RveCounts *counts, int 
   return BASE_OK;
 }
 
-static int pairs_for(const RveRecord *record) {
+int rve_record_pairs(const RveRecord *record) {
   const int slots = record->counts.slot_rows * record->counts.lanes, need = rve_head(record->arena)->need_pairs;
   return need > slots ? need : slots;
 }
@@ -51,7 +51,7 @@ enum { AHEAD_MOST = 512 << 10 };
 static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const RveCall *call, RveWorkspace *workspace) {
   for (;;) {
     RveScratch scratch;
-    TRY(reserve(workspace, &record->counts, pairs_for(record), &scratch));
+    TRY(reserve(workspace, &record->counts, rve_record_pairs(record), &scratch));
     if (workspace->ahead && workspace->ahead->bytes + record->bytes <= AHEAD_MOST)
       scratch.ahead = workspace->ahead->arena, scratch.ahead_bytes = workspace->ahead->bytes;
     const int outcome = batch->kernels->run(batch->features, call, record->arena, &record->counts, &scratch);
@@ -60,11 +60,11 @@ static BaseStatus run_record(const RveBatch *batch, RveRecord *record, const Rve
   }
 }
 
-static const RveInput nothing = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0};
+const RveInput rve_no_input = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0};
 
 /* After the kernels' measure. A network without solution fails the RVE, as every answer that is not a number. */
-static BaseStatus answer_conduction(const RveBatch *batch, RveRecord *record, const RveInput *input, double duration,
-                                    RveWorkspace *workspace) {
+BaseStatus rve_batch_conduction(const RveBatch *batch, RveRecord *record, const RveInput *input, double duration,
+                                RveWorkspace *workspace) {
   const BaseStatus status =
       rve_conduction_answer(record, &batch->scene, input, duration, &workspace->conduction);
   if (status != BASE_ERROR_UNSTABLE) return status;
@@ -78,21 +78,28 @@ static BaseStatus measure_record(const RveBatch *batch, RveRecord *record, const
   if (!head->failed)
     batch->kernels->measure(batch->features, call, record->arena, &record->counts, work_before, duration,
                             &record->last);
-  if (!head->failed) TRY(answer_conduction(batch, record, input, duration, workspace));
+  if (!head->failed) TRY(rve_batch_conduction(batch, record, input, duration, workspace));
   if (head->failed) record->last.status = BASE_ERROR_UNSTABLE;
   return BASE_OK;
 }
 
-/* Lists and forces of the present state, without time passing and without work done; then the answer. */
-static BaseStatus refresh_record(const RveBatch *batch, RveRecord *record, RveWorkspace *workspace) {
+BaseStatus rve_batch_refresh_one(const RveBatch *batch, RveRecord *record, RveWorkspace *workspace) {
   RveHead *head = rve_head(record->arena);
   RveCall call;
   const double friction = head->friction_work, damping = head->damping_work;
-  TRY(rve_call_make(&batch->scene, head, &nothing, 0.0, &call));
+  TRY(rve_call_make(&batch->scene, head, &rve_no_input, 0.0, &call));
   TRY(run_record(batch, record, &call, workspace));
   head = rve_head(record->arena);
   head->friction_work = friction, head->damping_work = damping;
-  return measure_record(batch, record, &call, friction, &nothing, 0.0, workspace);
+  return measure_record(batch, record, &call, friction, &rve_no_input, 0.0, workspace);
+}
+
+BaseStatus rve_batch_run_call(RveBatch *batch, int rve, const RveCall *call, double work_before, const RveInput *input,
+                              double duration, RveWorkspace *workspace) {
+  RveRecord *record = &batch->record[rve];
+  if (call->steps > 0) TRY(run_record(batch, record, call, workspace));
+  TRY(measure_record(batch, record, call, work_before, input, duration, workspace));
+  return rve_head(record->arena)->failed ? rve_note_failure(batch, rve, call, input, duration, workspace) : BASE_OK;
 }
 
 static BaseStatus step_record(RveBatch *batch, int rve, const RveInput *input, double duration,
@@ -107,9 +114,7 @@ static BaseStatus step_record(RveBatch *batch, int rve, const RveInput *input, d
   }
   workspace->kept = batch->keep && rve_may_fail(batch, record, &call);
   if (workspace->kept) TRY(rve_keep_before(record, workspace));
-  if (call.steps > 0) TRY(run_record(batch, record, &call, workspace));
-  TRY(measure_record(batch, record, &call, work_before, input, duration, workspace));
-  return rve_head(record->arena)->failed ? rve_note_failure(batch, rve, &call, input, duration, workspace) : BASE_OK;
+  return rve_batch_run_call(batch, rve, &call, work_before, input, duration, workspace);
 }
 
 /* ------------------------------------------------------------------------------------------------------- creation */
@@ -142,42 +147,18 @@ static BaseStatus set_threads(RveBatch *batch) {
   }
   return BASE_OK;
 }
-static int threads_of(const RveBatch *batch) {
+int rve_batch_threads(const RveBatch *batch) {
   const int threads = batch->scene.threads > 0 ? batch->scene.threads : omp_get_max_threads();
   return threads < batch->threads ? threads : batch->threads;
 }
 
-static BaseStatus choose_backend(RveBatch *batch, RveBackend backend) {
-  batch->kernels = choose_kernels(&batch->scene);
-  strcpy(batch->name, "cpu/");
-  strcat(batch->name, batch->kernels->name);
-  if (backend == RVE_BACKEND_CPU || (backend == RVE_BACKEND_AUTO && !rve_device_present())) return BASE_OK;
-  const RveKernels *layout;
-  BaseStatus status = rve_device_create(&layout, &batch->device);
-  if (status != BASE_OK && backend == RVE_BACKEND_AUTO) return BASE_OK;
-  TRY(status);
-  batch->kernels = layout;
-  strcpy(batch->name, "cuda");
-  return BASE_ALLOC((size_t)batch->count, &batch->job);
-}
-
-BaseStatus rve_batch_upload(RveBatch *batch, int k) {
-  const RveRecord *record = &batch->record[k];
-  return batch->device ? rve_device_upload(batch->device, k, &record->counts, record->bytes, record->arena) : BASE_OK;
-}
-BaseStatus rve_batch_download(const RveBatch *batch, int k) {
-  return batch->device ? rve_device_download(batch->device, k, batch->record[k].arena) : BASE_OK;
-}
-
-static BaseStatus device_refresh(RveBatch *batch, int n, const int *index);
-
 BaseStatus rve_batch_refresh(RveBatch *batch, int n, const int *index) {
   BaseStatus first = BASE_OK;
-  if (batch->device) return device_refresh(batch, n, index);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch))
+  if (batch->device) return rve_batch_refresh_there(batch, n, index);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(rve_batch_threads(batch))
   for (int k = 0; k < n; k++) {
     BaseStatus status =
-        refresh_record(batch, &batch->record[index ? index[k] : k], &batch->workspace[omp_get_thread_num()]);
+        rve_batch_refresh_one(batch, &batch->record[index ? index[k] : k], &batch->workspace[omp_get_thread_num()]);
     if (status != BASE_OK) {
 #pragma omp critical(rve_refresh)
       first = status;
@@ -198,7 +179,7 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   batch->scene = *scene;
   batch->features = rve_scene_features(scene);
   batch->count = count;
-  TRY_GOTO(choose_backend(batch, backend), status, failed);
+  TRY_GOTO(rve_batch_open_device(batch, backend), status, failed);
   TRY_GOTO(set_threads(batch), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->record), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->failed), status, failed);
@@ -223,7 +204,7 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   for (int k = 0; k < count; k++)
     if (rve_head(batch->record[k].arena)->failed) {
       const RveCall still = {.steps = 0};
-      TRY_GOTO(rve_note_failure(batch, k, &still, &nothing, 0.0, NULL), status, failed);
+      TRY_GOTO(rve_note_failure(batch, k, &still, &rve_no_input, 0.0, NULL), status, failed);
       status = base_error(BASE_ERROR_ARGUMENT, "RVE %d: %s", k, batch->failed[k]->failure.cause);
       goto failed;
     }
@@ -282,87 +263,6 @@ static BaseStatus check_input(const RveBatch *batch, int n, const RveInput *inpu
   return BASE_OK;
 }
 
-/* Conductivities that the kernels do not know are the host's: the state comes back for them. */
-static BaseStatus device_conduction(RveBatch *batch, int rve, const RveInput *input, double duration) {
-  RveRecord *record = &batch->record[rve];
-  if (record->last.status != BASE_OK) return BASE_OK;
-  if (rve_conduction_is_own(&batch->scene)) TRY(rve_batch_download(batch, rve));
-  return answer_conduction(batch, record, input, duration, &batch->workspace[0]);
-}
-
-static BaseStatus add_job(RveBatch *batch, int rve, const RveInput *input, double duration, int *count) {
-  RveDeviceJob *job = &batch->job[*count];
-  const RveHead *head = rve_head(batch->record[rve].arena);
-  if (head->failed) return BASE_OK;
-  memset(job, 0, sizeof *job);
-  TRY(rve_call_make(&batch->scene, head, input ? input : &nothing, duration, &job->call));
-  job->rve = rve;
-  if (input) job->input = *input;
-  job->refresh = input == NULL;
-  job->pairs = pairs_for(&batch->record[rve]);
-  job->work_before = batch->record[rve].last.friction_work;
-  job->duration = duration;
-  job->answer = batch->record[rve].last;
-  ++*count;
-  return BASE_OK;
-}
-
-static BaseStatus grow_on_device(RveBatch *batch, RveDeviceJob *job) {
-  TRY(rve_batch_download(batch, job->rve));
-  TRY(rve_record_grow(&batch->record[job->rve]));
-  TRY(rve_batch_upload(batch, job->rve));
-  job->pairs = pairs_for(&batch->record[job->rve]);
-  return BASE_OK;
-}
-
-static BaseStatus take_answer(RveBatch *batch, const RveDeviceJob *job) {
-  RveRecord *record = &batch->record[job->rve];
-  record->last = job->answer;
-  batch->flown += job->duration > 0.0 && job->answer.flew;
-  rve_head(record->arena)->failed = record->last.status;
-  rve_head(record->arena)->temperature = job->call.temperature;
-  TRY(device_conduction(batch, job->rve, job->refresh ? &nothing : &job->input, job->duration));
-  if (!record->last.status || job->refresh) return BASE_OK;
-  TRY(rve_batch_download(batch, job->rve));
-  rve_head(record->arena)->failed = record->last.status;
-  return rve_note_failure(batch, job->rve, &job->call, &nothing, job->duration, NULL);
-}
-
-/* All jobs at once; those whose arena was too small grow on the host and go on. */
-static BaseStatus run_jobs(RveBatch *batch, int count) {
-  for (int pending = count; pending > 0;) {
-    TRY(rve_device_run(batch->device, batch->features, batch->job, pending));
-    int left = 0;
-    for (int k = 0; k < pending; k++) {
-      RveDeviceJob *job = &batch->job[k];
-      if (job->outcome == RVE_TOO_SMALL) {
-        TRY(grow_on_device(batch, job));
-        batch->job[left++] = *job;
-      } else {
-        TRY(take_answer(batch, job));
-      }
-    }
-    pending = left;
-  }
-  return BASE_OK;
-}
-
-static BaseStatus device_refresh(RveBatch *batch, int n, const int *index) {
-  int count = 0;
-  for (int k = 0; k < n; k++) {
-    TRY(rve_batch_upload(batch, index ? index[k] : k));
-    TRY(add_job(batch, index ? index[k] : k, NULL, 0.0, &count));
-  }
-  return run_jobs(batch, count);
-}
-
-/* Twins are not copied there: a copy's own call takes longer than a device takes for the steps. */
-static BaseStatus device_step(RveBatch *batch, int n, const int *index, const RveInput *input, double duration) {
-  int count = 0;
-  for (int k = 0; k < n; k++) TRY(add_job(batch, index ? index[k] : k, &input[k], duration, &count));
-  return run_jobs(batch, count);
-}
-
 /* Threads take the RVEs in turns, more or less. */
 static const RveTwin *ahead_of(const RveBatch *batch, int n, int k) {
   const int next = k + omp_get_num_threads();
@@ -376,7 +276,7 @@ static BaseStatus host_step(RveBatch *batch, int n, const int *index, const RveI
   rve_twins_sort(batch, n, index, input);
   for (int followers = 0; followers < 2; followers++) {
     const int good = first == BASE_OK;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_of(batch)) reduction(+ : copied, flown)
+#pragma omp parallel for schedule(dynamic, 1) num_threads(rve_batch_threads(batch)) reduction(+ : copied, flown)
     for (int k = 0; k < n; k++) {
       const RveTwin *twin = &batch->twin[k];
       const int follows = twin->leader != twin->rve;
@@ -421,7 +321,7 @@ BaseStatus rve_batch_step(RveBatch *batch, int n, const int *index, const RveInp
   TRY(set_threads(batch));
   BaseStatus first = BASE_OK;
   if (batch->device) {
-    TRY(device_step(batch, n, index, input, duration));
+    TRY(rve_batch_step_there(batch, n, index, input, duration));
   } else {
     first = host_step(batch, n, index, input, duration);
   }

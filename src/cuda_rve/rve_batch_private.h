@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The RveBatch as its own source files see it: rve_batch.c steps, rve_batch_states.c takes states in and out,
- * rve_watchdog.c says why an RVE failed. */
+ * rve_batch_device.c runs them on a device, rve_watchdog.c says why an RVE failed. */
 #ifndef DEMPM_RVE_BATCH_PRIVATE_H
 #define DEMPM_RVE_BATCH_PRIVATE_H
 
@@ -48,6 +48,7 @@ struct RveBatch {
   int keep;           /* states before calls */
   uint64_t *history;  /* [count] equal numbers: same packing, same calls */
   uint64_t histories; /* numbers used */
+  int apart;          /* 1: RVEs went on without their histories being kept */
   RveTwin *twin;      /* [count] of the present call */
   int64_t shared;     /* RVE steps copied since creation */
   int64_t flown;      /* RVE steps that were free flights since then, copies excepted */
@@ -59,9 +60,28 @@ struct RveBatch {
 
 /* BASE_ERROR_ARGUMENT unless index[0..n) are RVEs of the batch (index NULL: its first n). */
 BaseStatus rve_batch_check_index(const RveBatch *batch, int n, const int *index);
-/* RVE k to and from the device; nothing without one. */
+
+/* rve_batch.c: parts of a step on the host */
+extern const RveInput rve_no_input; /* at rest, at 0 C */
+int rve_batch_threads(const RveBatch *batch);
+const RveKernels *rve_batch_host_kernels(const RveScene *scene);
+int rve_record_pairs(const RveRecord *record); /* candidate pairs to have room for */
+BaseStatus rve_batch_conduction(const RveBatch *batch, RveRecord *record, const RveInput *input, double duration,
+                                RveWorkspace *workspace);
+/* Lists, forces and answer of the present state, without time passing and without work done. */
+BaseStatus rve_batch_refresh_one(const RveBatch *batch, RveRecord *record, RveWorkspace *workspace);
+/* Runs a call, or goes on with one, and measures. */
+BaseStatus rve_batch_run_call(RveBatch *batch, int rve, const RveCall *call, double work_before, const RveInput *input,
+                              double duration, RveWorkspace *workspace);
+
+/* rve_batch_device.c. RVE k to and from the device; nothing without one. All that finds the device's memory too small goes on on
+ * the CPU, with all RVEs: whether batch->device is left must be looked at again. */
+BaseStatus rve_batch_open_device(RveBatch *batch, RveBackend backend);
 BaseStatus rve_batch_upload(RveBatch *batch, int k);
 BaseStatus rve_batch_download(const RveBatch *batch, int k);
+BaseStatus rve_batch_refresh_there(RveBatch *batch, int n, const int *index);
+BaseStatus rve_batch_step_there(RveBatch *batch, int n, const int *index, const RveInput *input, double duration);
+
 /* Lists, forces and answers of RVEs index[0..n), after a change from outside. */
 BaseStatus rve_batch_refresh(RveBatch *batch, int n, const int *index);
 

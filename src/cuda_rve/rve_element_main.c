@@ -163,7 +163,7 @@ static BaseStatus make_path(const Arguments *a, const ElementSettings *settings,
   return element_path_make(a->path, settings, answer.stress, path);
 }
 
-static void report(const Arguments *a, const RvePacking *packing, const RveBatch *batch, const ElementPath *path,
+static void report(const Arguments *a, const RvePacking *packing, const RveBatch *batch, RveBackend asked, const ElementPath *path,
                    const ElementFigures *f) {
   const int dim = packing->dimension;
   printf("packing          %s: %d grains\n", a->file, packing->grains);
@@ -182,8 +182,9 @@ static void report(const Arguments *a, const RvePacking *packing, const RveBatch
   rve_batch_network_counts(batch, &solved, &kept);
   if (solved > 0)
     printf("conductivity     networks: %lld solved, %lld carried along\n", (long long)solved, (long long)kept);
-  printf("backend          %s, %d %s\n", rve_batch_backend_name(batch), rve_batch_count(batch),
-         rve_batch_count(batch) == 1 ? "copy" : "copies");
+  printf("backend          %s, %d %s%s\n", rve_batch_backend_name(batch), rve_batch_count(batch),
+         rve_batch_count(batch) == 1 ? "copy" : "copies",
+         asked == RVE_BACKEND_CUDA && !rve_batch_is_on_device(batch) ? ": the GPU's memory is too small" : "");
   printf("speed            %.4g particle-steps in %.3f s: %.4g particle-steps/s\n", f->particle_steps, f->seconds,
          f->seconds > 0.0 ? f->particle_steps / f->seconds : 0.0);
 }
@@ -207,7 +208,7 @@ static BaseStatus run_batch(const Arguments *a, const ElementSettings *settings,
                             .replay_file = replay};
     status = close_out(a->out, out, element_run(&run, packing, batch, &figures));
   }
-  if (status == BASE_OK) report(a, packing, batch, &path, &figures);
+  if (status == BASE_OK) report(a, packing, batch, settings->backend, &path, &figures);
   element_path_destroy(&path);
   if (status == BASE_OK && a->plot) {
     fflush(stdout);

@@ -20,6 +20,10 @@ BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts
   (void)device, (void)rve, (void)counts, (void)bytes, (void)arena;
   return absent();
 }
+int rve_device_holds(const RveDevice *device, int rve) {
+  (void)device, (void)rve;
+  return 0;
+}
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena) {
   (void)device, (void)rve, (void)arena;
   return absent();

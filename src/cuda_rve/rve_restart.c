@@ -79,8 +79,8 @@ static BaseStatus check_header(const StateHeader *header, uint64_t scene_hash, c
   return BASE_OK;
 }
 
-/* Grains by id and contacts by ids, into the layout of other kernels. Forces and lists are to be made anew. */
-static BaseStatus convert(const RveKernels *kernels, const RveRecord *from, RveRecord *to) {
+/* Grains by id and contacts by ids. */
+BaseStatus rve_record_convert(const RveKernels *kernels, const RveRecord *from, RveRecord *to) {
   RveCounts n = from->counts;
   const RveArrays *a = &from->arrays, *b = &to->arrays;
   RveContacts contacts;
@@ -152,7 +152,7 @@ BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, con
                header.counts.reaction != kernels->reaction[dim];
   if (*canonical) {
     BaseStatus status = ids_are_a_permutation(&fresh)
-                            ? convert(kernels, &fresh, &converted)
+                            ? rve_record_convert(kernels, &fresh, &converted)
                             : base_error(BASE_ERROR_FORMAT, "state of an RVE: ids are out of range");
     rve_record_destroy(&fresh);
     TRY(status);

@@ -185,9 +185,9 @@ std::string FixMPMCouple::rve_lines() const {
   if (steps <= 0.0) return "";
   std::string line = format_text(
       "Fix %s: %lld RVEs of %lld grains in all, %.4g DEM particle-steps, %.4g per second, %.0f %% of the time in "
-      "RVEs\n",
+      "RVEs (backend %s)\n",
       id, (long long)law.rves, (long long)law.grains, steps, steps / seconds,
-      100.0 * (law.seconds - rve_seconds_before_) / seconds);
+      100.0 * (law.seconds - rve_seconds_before_) / seconds, rve_law_backend_name(rve_->law()));
   line += format_text("Fix %s: %lld RVE steps so far: %lld computed, %lld copies of one with the same packing and history, "
                       "%lld in free flight, %lld not run as their points rest\n",
                       id, (long long)(law.calls + law.rested), (long long)(law.calls - law.shared - law.flown),

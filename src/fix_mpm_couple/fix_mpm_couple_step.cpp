@@ -244,6 +244,7 @@ void FixMPMCouple::final_integrate() {
   for (size_t k = 0; k < walls_.size(); k++) wall_fixes_[k]->end_step(walls_[k], update->dt);
   check_time_step(false);
   if (output_is_due()) fill_output();
+  if (rve_) rve_->tell_backend();
   progress();
   /* Points have moved after LIGGGHTS fitted a shrink-wrapped box around them: a restart file needs a box that holds
    * them. */

@@ -37,7 +37,8 @@ FixMPMRve::FixMPMRve(LAMMPS *lammps, int narg, char **arg)
       assigned_(false),
       install_pending_(false),
       rest_pending_(false),
-      rest_error_(0.0) {
+      rest_error_(0.0),
+      told_backend_(false) {
   restart_global = 1;
   scene_.dimension = domain->dimension;
   scene_.reference_temperature = NAN; /* asked for when heat flows */
@@ -144,6 +145,12 @@ void FixMPMRve::settle_backend() {
   if (backend_ == RVE_BACKEND_CUDA)
     fix_warning(lmp, this, "keyword 'backend': 'cuda' is given, but not every rank has a GPU that answers; the packings run on the CPU");
   backend_ = RVE_BACKEND_CPU;
+}
+
+void FixMPMRve::tell_backend() {
+  if (told_backend_ || !law_ || !rve_law_left_device(law_)) return;
+  fix_warning(lmp, this, "the GPU's memory is too small for the packings; all go on on the CPU (keyword 'backend': 'cpu')");
+  told_backend_ = true;
 }
 
 void FixMPMRve::read_damping(KeywordParser &parser) {
@@ -259,6 +266,7 @@ void FixMPMRve::assign(const std::vector<int64_t> &tags) {
   fix_check(lmp, this, rve_law_assign(law_, (int)tags.size(), tags.data()));
   assigned_ = true;
   carry_out_pending();
+  tell_backend();
 }
 
 void FixMPMRve::carry_out_pending() {

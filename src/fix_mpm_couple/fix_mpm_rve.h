@@ -53,6 +53,8 @@ class FixMPMRve : public Fix {
   void prepare(const char *user, int type, bool thermal);
   /* Gives RVEs to the points that have none; collective. Then does what fix_modify asked for before there were RVEs. */
   void assign(const std::vector<int64_t> &tags);
+  /* Once: a warning if a GPU turned out to be too small. Alike on all ranks. */
+  void tell_backend();
   RveLaw *law() const { return law_; }
   bool has_state() const { return assigned_; } /* there are RVEs: this run's or a restart file's */
   bool has_bonds() const { return scene_.bonds != 0; }
@@ -69,6 +71,7 @@ class FixMPMRve : public Fix {
   std::vector<char> restart_state_; /* from a restart file, until the law exists */
   bool assigned_, install_pending_, rest_pending_;
   double rest_error_; /* keyword rest */
+  bool told_backend_;
 
   void read_keywords(int, char **);
   void check_keywords(const class KeywordParser &);

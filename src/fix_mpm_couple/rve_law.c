@@ -48,7 +48,7 @@ BaseStatus rve_law_create(MPI_Comm comm, const RveScene *scene, const RvePacking
   law->rank = rank;
   MPI_Comm_size(comm, &law->ranks);
   law->node_threads = rank_threads(comm);
-  law->backend = backend;
+  law->backend = backend == RVE_BACKEND_AUTO && !rve_device_present() ? RVE_BACKEND_CPU : backend;
   const RveScene resolved = with_threads(scene, law->node_threads);
   status = rve_store_create(&resolved, packings, packing_count, backend, &law->store);
   TRY_GOTO(rank_agree(law->comm, status, rank), status, fail);
@@ -74,6 +74,26 @@ void rve_law_destroy(RveLaw *law) {
   MPI_Comm_free(&law->comm);
   base_free(law);
 }
+
+/* Where a device is too small for its RVEs, all ranks leave theirs: another backend has other last bits, and an answer must not
+ * depend on its rank. Collective. */
+BaseStatus rve_law_agree_on_device(RveLaw *law) {
+  if (law->backend == RVE_BACKEND_CPU) return BASE_OK;
+  int left = rve_store_left_device(law->store), any;
+  MPI_Allreduce(&left, &any, 1, MPI_INT, MPI_MAX, law->comm);
+  if (!any) return BASE_OK;
+  law->backend = RVE_BACKEND_CPU;
+  law->left_device = 1;
+  return rank_agree(law->comm, rve_store_leave_device(law->store), law->rank);
+}
+
+/* After a change of all RVEs. */
+static BaseStatus agree(RveLaw *law, BaseStatus status) {
+  TRY(rank_agree(law->comm, status, law->rank));
+  return rve_law_agree_on_device(law);
+}
+
+int rve_law_left_device(const RveLaw *law) { return law->left_device; }
 
 /* -- which RVEs there are -------------------------------------------------------------------------------------- */
 
@@ -117,7 +137,8 @@ static BaseStatus assign(RveLaw *law, int n, const int64_t *tags, int forget) {
   TRY(rve_farm_assign(law->farm, n, tags, forget));
   for (int h = rve_store_next(law->store, -1); h >= 0; h = rve_store_next(law->store, h))
     if (rve_farm_handle(law->farm, rve_store_item(law->store, h)->tag) != h) rve_store_release(law->store, h);
-  return rve_law_create_missing(law->comm, law->farm, law->store);
+  TRY(rve_law_create_missing(law->comm, law->farm, law->store));
+  return rve_law_agree_on_device(law);
 }
 
 BaseStatus rve_law_assign(RveLaw *law, int n, const int64_t *tags) { return assign(law, n, tags, 1); }
@@ -298,6 +319,7 @@ static BaseStatus step_requests(RveLaw *law, double dt) {
     status = report_failure(law, unstable, key);
   }
   TRY(rank_agree(law->comm, status, key));
+  TRY(rve_law_agree_on_device(law));
 
   judge_rest(law, run, dt);
   law->worst_unbalanced = 0.0;
@@ -331,14 +353,14 @@ void rve_law_as_mpm_law(RveLaw *law, MpmLaw *mpm_law) {
 
 BaseStatus rve_law_set_scene(RveLaw *law, const RveScene *scene) {
   const RveScene resolved = with_threads(scene, law->node_threads);
-  return rank_agree(law->comm, rve_store_set_scene(law->store, &resolved), law->rank);
+  return agree(law, rve_store_set_scene(law->store, &resolved));
 }
 
 BaseStatus rve_law_install_bonds(RveLaw *law) {
-  return rank_agree(law->comm, rve_store_install_bonds(law->store), law->rank);
+  return agree(law, rve_store_install_bonds(law->store));
 }
 
-BaseStatus rve_law_rest(RveLaw *law) { return rank_agree(law->comm, rve_store_rest(law->store), law->rank); }
+BaseStatus rve_law_rest(RveLaw *law) { return agree(law, rve_store_rest(law->store)); }
 
 int rve_law_threads(const RveLaw *law) { return rve_store_scene(law->store)->threads; }
 

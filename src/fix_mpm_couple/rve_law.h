@@ -41,7 +41,8 @@ typedef struct RveLawTotals {
 } RveLawTotals;
 
 /* scene, packings are copied; point tag t gets packing packing_of_tag(t) = (t - 1) mod packing_count.
- * scene->threads = 0 and no OMP_NUM_THREADS: each rank takes its share of its node's cores. */
+ * A GPU whose memory is too small on any rank: all RVEs go on on the CPU (rve_law_left_device). AUTO must find devices on all ranks or
+ * on none. scene->threads = 0 and no OMP_NUM_THREADS: each rank takes its share of its node's cores. */
 BaseStatus rve_law_create(MPI_Comm comm, const RveScene *scene, const RvePacking *packings, int packing_count,
                           RveBackend backend, RveLaw **law);
 void rve_law_destroy(RveLaw *law); /* accepts NULL */
@@ -76,6 +77,7 @@ BaseStatus rve_law_install_bonds(RveLaw *law);
 BaseStatus rve_law_rest(RveLaw *law);
 double rve_law_bulk_density(const RveLaw *law);      /* mean of packings: mass of grains / cell volume, kg/m3; local */
 int rve_law_threads(const RveLaw *law);              /* OpenMP threads of this rank; 0 = OpenMP's own choice; local */
+int rve_law_left_device(const RveLaw *law);          /* 1: a GPU's memory was too small; alike on all ranks; local */
 const char *rve_law_backend_name(const RveLaw *law); /* of this rank's RVEs, "" if it has none; local */
 
 /* All RVEs' states for a restart: gathers on rank 0 (others get NULL, 0), in the order of tags, so that the bytes

@@ -11,7 +11,8 @@ struct RveLaw {
   MPI_Comm comm; /* own duplicate */
   int rank, ranks;
   int node_threads; /* this rank's share of its node's cores */
-  RveBackend backend;
+  RveBackend backend; /* alike on all ranks */
+  int left_device;    /* 1: the RVEs went to the CPU */
   RveFarm *farm;
   RveStore *store;
   int rves_run;    /* on this rank, in the last step */
@@ -30,5 +31,7 @@ struct RveLaw {
 
 /* Creates the RVEs of tags that `farm` gave to this rank and `store` has not. Collective. */
 BaseStatus rve_law_create_missing(MPI_Comm comm, RveFarm *farm, RveStore *store);
+/* All ranks' RVEs go to the CPU if those of one did. Collective. */
+BaseStatus rve_law_agree_on_device(RveLaw *law);
 
 #endif

@@ -364,7 +364,7 @@ BaseStatus rve_law_unpack(RveLaw *law, const void *bytes, size_t size) {
   law->farm = farm;
   law->store = store;
   if (law->replay_directory) rve_store_keep_states(store);
-  return BASE_OK;
+  return rve_law_agree_on_device(law);
 
 fail:
   rve_farm_destroy(farm);

@@ -80,7 +80,7 @@ BaseStatus rve_store_create(const RveScene *scene, const RvePacking *packings, i
   TRY(rve_scene_check(scene));
   TRY(BASE_ALLOC(1, &store));
   store->scene = *scene;
-  store->backend = backend;
+  store->backend = backend == RVE_BACKEND_AUTO && !rve_device_present() ? RVE_BACKEND_CPU : backend;
   store->unused = -1;
   TRY_GOTO(copy_packings(store, packings, packing_count), status, fail);
   *result = store;
@@ -365,6 +365,19 @@ void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
   }
   for (int s = 0; s < store->slots; s++)
     if (store->slot[s].batch >= 0) totals->grains += store->slot[s].item.grains;
+}
+
+int rve_store_left_device(const RveStore *store) {
+  int left = 0;
+  for (int b = 0; b < store->batches && store->backend != RVE_BACKEND_CPU; b++)
+    left += !rve_batch_is_on_device(store->batch[b]);
+  return left > 0;
+}
+
+BaseStatus rve_store_leave_device(RveStore *store) {
+  for (int b = 0; b < store->batches; b++) TRY(rve_batch_leave_device(store->batch[b]));
+  store->backend = RVE_BACKEND_CPU;
+  return BASE_OK;
 }
 
 const char *rve_store_backend_name(const RveStore *store) {

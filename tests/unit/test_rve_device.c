@@ -176,11 +176,153 @@ static void states_move_between_device_and_cpu(void **state) {
   for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
 }
 
+/* 2D: a large grain in a ring of small ones that move slowly, and all touch it when the cell has shrunk a little. Its row of the list
+ * is then longer than the room that a packing begins with. */
+static RvePacking make_ring(double small_radius) {
+  enum { SMALL = 24 };
+  RvePacking ring = help_packing(2, SMALL + 1);
+  uint64_t seed = 5;
+  MUST(BASE_ALLOC(3 * (size_t)ring.grains, &ring.velocity));
+  for (int k = 0; k < 2; k++) ring.cell[4 * k] = 54e-3;
+  ring.radius[0] = 12e-3;
+  for (int g = 1; g <= SMALL; g++) {
+    const double angle = 2.0 * 3.14159265358979323846 * g / SMALL;
+    ring.radius[g] = small_radius;
+    ring.position[3 * g] = 16.5e-3 * cos(angle) / ring.cell[0];
+    ring.position[3 * g + 1] = 16.5e-3 * sin(angle) / ring.cell[4];
+    for (int k = 0; k < 2; k++) ring.velocity[3 * g + k] = help_uniform(&seed, -1e-2, 1e-2);
+  }
+  return ring;
+}
+
+/* All RVEs alike, whatever was before. */
+static void compress(RveBatch *batch, double rate, double duration, RveAnswer answer[RVES]) {
+  RveInput input[RVES];
+  memset(input, 0, sizeof input);
+  for (int k = 0; k < RVES; k++) input[k].velocity_gradient[0] = input[k].velocity_gradient[4] = -rate;
+  MUST(rve_batch_step(batch, RVES, NULL, input, duration, answer));
+}
+
+static void flights_are_those_of_the_cpu(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  const int which[RVES] = {0, 0, 1, 0, 1};
+  RvePacking packing[2] = {make_ring(1.5e-3), help_random(2, 7, 2e4, 70)};
+  const RveScene scene = scene_of(2, FRICTION);
+  RveBatch *here, *there;
+  RveAnswer expected[RVES], found[RVES];
+  MUST(rve_batch_create(&scene, packing, 2, which, RVES, RVE_BACKEND_CPU, &here));
+  MUST(rve_batch_create(&scene, packing, 2, which, RVES, RVE_BACKEND_CUDA, &there));
+  for (int call = 0; call < 3; call++) {
+    compress(here, 5.0 * call, 1e-3, expected);
+    compress(there, 5.0 * call, 1e-3, found);
+    for (int k = 0; k < RVES; k++) {
+      assert_true(found[k].flew == (which[k] == 0) && expected[k].flew == found[k].flew);
+      assert_true(difference(&found[k], &expected[k]) < 1e-9);
+    }
+    assert_true(found[0].kinetic_energy > 0.0);
+  }
+  assert_true(rve_batch_flown(there) == 9);
+  rve_batch_destroy(here);
+  rve_batch_destroy(there);
+  for (int k = 0; k < 2; k++) rve_packing_destroy(&packing[k]);
+}
+
+/* The stand-in for a device refuses every piece of memory from now on. */
+static void refuse_memory(int from_now_on) {
+  if (from_now_on) setenv("DEMPM_CUDA_HOST_MEMORY", "1", 1);
+  else unsetenv("DEMPM_CUDA_HOST_MEMORY");
+}
+
+static void a_device_without_room_hands_a_new_batch_to_the_cpu(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  RvePacking packing[SIZES];
+  RveAnswer expected[RVES], found[RVES];
+  const RveScene scene = scene_of(2, BONDS);
+  make_packings(2, packing);
+  RveBatch *here = make_batch(&scene, packing, RVE_BACKEND_CPU);
+  refuse_memory(1);
+  RveBatch *there = make_batch(&scene, packing, RVE_BACKEND_CUDA);
+  refuse_memory(0);
+  assert_false(rve_batch_is_on_device(there));
+  assert_string_equal(rve_batch_backend_name(there), rve_batch_backend_name(here));
+  run_calls(here, &scene, 0, CALLS, expected);
+  run_calls(there, &scene, 0, CALLS, found);
+  for (int k = 0; k < RVES; k++) assert_true(difference(&found[k], &expected[k]) < 1e-9);
+  rve_batch_destroy(here);
+  rve_batch_destroy(there);
+  for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
+}
+
+/* In the middle of a call, when a list has outgrown its room: that of the ring, which bonds hold together while it is squeezed; the
+ * other packings have finished the call then. Afterwards those of one packing
+ * get the same input, and must not be taken for twins. */
+static void a_device_that_becomes_too_small_hands_over_to_the_cpu(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  const int which[RVES] = {0, 1, 0, 0, 1};
+  RvePacking packing[2] = {make_ring(2.155e-3), help_random(2, 7, 2e4, 70)};
+  RveScene scene = scene_of(2, BONDS);
+  RveBatch *here, *there;
+  scene.bond_strength = 1.0;
+  RveAnswer expected[RVES], found[RVES];
+  MUST(rve_batch_create(&scene, packing, 2, which, RVES, RVE_BACKEND_CPU, &here));
+  MUST(rve_batch_create(&scene, packing, 2, which, RVES, RVE_BACKEND_CUDA, &there));
+  MUST(rve_batch_install_bonds(here, 0, NULL));
+  MUST(rve_batch_install_bonds(there, 0, NULL));
+  run_calls(here, &scene, 0, 1, expected);
+  run_calls(there, &scene, 0, 1, found);
+  assert_true(rve_batch_is_on_device(there));
+  refuse_memory(1);
+  compress(here, 40.0, 5e-3, expected);
+  compress(there, 40.0, 5e-3, found);
+  refuse_memory(0);
+  assert_false(rve_batch_is_on_device(there));
+  for (int k = 0; k < RVES; k++) {
+    assert_true(difference(&found[k], &expected[k]) < 1e-9);
+    assert_true(expected[k].coordination > 1.5 && expected[k].bond_fraction > 0.0);
+  }
+  compress(here, 1.0, 1e-4, expected);
+  compress(there, 1.0, 1e-4, found);
+  for (int k = 0; k < RVES; k++) assert_true(difference(&found[k], &expected[k]) < 1e-9);
+  assert_true(difference(&found[1], &found[4]) > 1e-3);
+  rve_batch_destroy(here);
+  rve_batch_destroy(there);
+  for (int k = 0; k < 2; k++) rve_packing_destroy(&packing[k]);
+}
+
+/* With bonds and heat, as the states lie on the device between two calls. */
+static void a_batch_can_leave_the_device(void **state) {
+  (void)state;
+  NEED_A_DEVICE();
+  for (int dimension = 2; dimension <= 3; dimension++) {
+    RvePacking packing[SIZES];
+    RveAnswer stayed[RVES], left[RVES];
+    const RveScene scene = scene_of(dimension, BONDS);
+    make_packings(dimension, packing);
+    RveBatch *batch[2] = {make_batch(&scene, packing, RVE_BACKEND_CUDA), make_batch(&scene, packing, RVE_BACKEND_CUDA)};
+    run_calls(batch[0], &scene, 0, CALLS, stayed);
+    run_calls(batch[1], &scene, 0, CALLS, left);
+    MUST(rve_batch_leave_device(batch[1]));
+    run_calls(batch[0], &scene, CALLS, 1, stayed);
+    run_calls(batch[1], &scene, CALLS, 1, left);
+    assert_true(rve_batch_is_on_device(batch[0]) && !rve_batch_is_on_device(batch[1]));
+    for (int k = 0; k < RVES; k++) assert_true(difference(&left[k], &stayed[k]) < 1e-9);
+    for (int b = 0; b < 2; b++) rve_batch_destroy(batch[b]);
+    for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_device_answers_as_the_cpu_does),
       cmocka_unit_test(answers_do_not_depend_on_where_states_lie),
       cmocka_unit_test(states_move_between_device_and_cpu),
+      cmocka_unit_test(flights_are_those_of_the_cpu),
+      cmocka_unit_test(a_device_without_room_hands_a_new_batch_to_the_cpu),
+      cmocka_unit_test(a_device_that_becomes_too_small_hands_over_to_the_cpu),
+      cmocka_unit_test(a_batch_can_leave_the_device),
   };
   return cmocka_run_group_tests_name("device", tests, NULL, NULL);
 }
