@@ -179,7 +179,7 @@ BaseStatus rve_batch_create(const RveScene *scene, const RvePacking *packings, i
   batch->scene = *scene;
   batch->features = rve_scene_features(scene);
   batch->count = count;
-  TRY_GOTO(rve_batch_open_device(batch, backend), status, failed);
+  TRY_GOTO(rve_batch_choose_backend(batch, backend), status, failed);
   TRY_GOTO(set_threads(batch), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->record), status, failed);
   TRY_GOTO(BASE_ALLOC((size_t)count, &batch->failed), status, failed);

@@ -14,7 +14,7 @@ static void use_host(RveBatch *batch) {
   strcat(batch->name, batch->kernels->name);
 }
 
-BaseStatus rve_batch_open_device(RveBatch *batch, RveBackend backend) {
+BaseStatus rve_batch_choose_backend(RveBatch *batch, RveBackend backend) {
   use_host(batch);
   if (backend == RVE_BACKEND_CPU || (backend == RVE_BACKEND_AUTO && !rve_device_present())) return BASE_OK;
   const RveKernels *layout;

@@ -74,9 +74,9 @@ BaseStatus rve_batch_refresh_one(const RveBatch *batch, RveRecord *record, RveWo
 BaseStatus rve_batch_run_call(RveBatch *batch, int rve, const RveCall *call, double work_before, const RveInput *input,
                               double duration, RveWorkspace *workspace);
 
-/* rve_batch_device.c. RVE k to and from the device; nothing without one. All that finds the device's memory too small goes on on
- * the CPU, with all RVEs: whether batch->device is left must be looked at again. */
-BaseStatus rve_batch_open_device(RveBatch *batch, RveBackend backend);
+/* rve_batch_device.c. When the device's memory is too small, these take all RVEs to the CPU and go on there; batch->device is NULL
+ * afterwards. upload, download: RVE k to and from the device; nothing without one. */
+BaseStatus rve_batch_choose_backend(RveBatch *batch, RveBackend backend);
 BaseStatus rve_batch_upload(RveBatch *batch, int k);
 BaseStatus rve_batch_download(const RveBatch *batch, int k);
 BaseStatus rve_batch_refresh_there(RveBatch *batch, int n, const int *index);

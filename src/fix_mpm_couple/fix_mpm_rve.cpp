@@ -149,7 +149,8 @@ void FixMPMRve::settle_backend() {
 
 void FixMPMRve::tell_backend() {
   if (told_backend_ || !law_ || !rve_law_left_device(law_)) return;
-  fix_warning(lmp, this, "the GPU's memory is too small for the packings; all go on on the CPU (keyword 'backend': 'cpu')");
+  fix_warning(lmp, this, "a GPU's memory is too small for its packings, or it could not be opened; all packings go on on the CPU "
+                         "(keyword 'backend': 'cpu')");
   told_backend_ = true;
 }
 
