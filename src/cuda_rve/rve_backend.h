@@ -66,6 +66,7 @@ typedef struct RveRecord {
 } RveRecord;
 
 /* rve_state.c, rve_restart.c, rve_view.c, rve_conduction.c */
+RveCounts rve_counts_for(const RveKernels *kernels, int dimension, int grains); /* before anything is known of the list */
 BaseStatus rve_record_from_packing(const RveKernels *kernels, const RveScene *scene, const RvePacking *packing,
                                    RveRecord *record);
 void rve_record_destroy(RveRecord *record);

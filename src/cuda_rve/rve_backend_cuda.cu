@@ -35,6 +35,7 @@ struct RveDevice {
   DeviceJob *host, *device; /* host: pinned, so that copies run beside kernels */
   int jobs; /* room in both */
   int part; /* jobs of one launch, at most */
+  int warps; /* of a block, at most */
   char *scratch[STREAMS];
   size_t scratch_bytes[STREAMS];
   int shared_limit; /* bytes of shared memory that a block may ask for */
@@ -135,14 +136,27 @@ static BaseStatus reserve_shared(RveDevice *device) {
     own = (int)attributes.sharedSizeBytes > own ? (int)attributes.sharedSizeBytes : own;
   }
   device->shared_limit -= own;
-  for (int k = 0; k < VARIANTS; k++)
-    TRY(checked(cudaFuncSetAttribute((const void *)kernels[k], cudaFuncAttributeMaxDynamicSharedMemorySize, device->shared_limit),
+  for (int k = 0; k < VARIANTS; k++) {
+    const void *const kernel = (const void *)kernels[k];
+    TRY(checked(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, device->shared_limit),
                 "reserving shared memory"));
+    /* or the driver may leave too little for a second block */
+    TRY(checked(cudaFuncSetAttribute(kernel, cudaFuncAttributePreferredSharedMemoryCarveout, cudaSharedmemCarveoutMaxShared),
+                "reserving shared memory"));
+  }
   return BASE_OK;
+}
+
+/* Fewer warps, of several packs of grains each, leave registers for other blocks on a multiprocessor: for experiments, DEMPM_CUDA_WARPS. */
+static int most_warps(void) {
+  const char *const wanted = getenv("DEMPM_CUDA_WARPS");
+  const int warps = wanted ? atoi(wanted) : WARPS_MAX;
+  return warps < 1 || warps > WARPS_MAX ? WARPS_MAX : warps;
 }
 
 static BaseStatus open_device(RveDevice *device) {
   device->part = PART;
+  device->warps = most_warps();
   TRY(choose_device(&device->id));
   TRY(reserve_shared(device));
   for (int k = 0; k < STREAMS; k++) TRY(checked(cudaStreamCreate(&device->stream[k]), "opening a stream"));
@@ -287,7 +301,7 @@ static BaseStatus launch_part(RveDevice *device, RveFeatures features, int strea
   const size_t bytes = (size_t)(end - first) * sizeof *host;
   int blocks = 1, in_shared = fits(device, host);
   for (int k = first; k < end; k++) blocks = device->host[k].counts.blocks > blocks ? device->host[k].counts.blocks : blocks;
-  const int rounds = (blocks + WARPS_MAX - 1) / WARPS_MAX, warps = (blocks + rounds - 1) / rounds;
+  const int rounds = (blocks + device->warps - 1) / device->warps, warps = (blocks + rounds - 1) / rounds;
   void *arguments[] = {&there, &in_shared};
   TRY(checked(cudaMemcpyAsync(there, host, bytes, cudaMemcpyHostToDevice, way), "copying jobs to the device"));
   TRY(checked(cudaLaunchKernel((const void *)kernels[variant_of(features)], dim3((unsigned)(end - first)), dim3(32u * (unsigned)warps),

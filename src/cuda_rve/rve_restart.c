@@ -81,18 +81,12 @@ static BaseStatus check_header(const StateHeader *header, uint64_t scene_hash, c
 
 /* Grains by id and contacts by ids. */
 BaseStatus rve_record_convert(const RveKernels *kernels, const RveRecord *from, RveRecord *to) {
-  RveCounts n = from->counts;
+  RveCounts n = rve_counts_for(kernels, from->counts.dimension, from->counts.grains);
   const RveArrays *a = &from->arrays, *b = &to->arrays;
   RveContacts contacts;
   RveSlot slot;
   int rows = 0;
   BaseStatus status;
-  n.lanes = kernels->lanes;
-  n.blocks = (n.grains + n.lanes - 1) / n.lanes;
-  n.slot_rows = n.blocks * (n.dimension == 2 ? 4 : 6) + 4;
-  n.incoming_rows = n.blocks * (n.dimension == 2 ? 5 : 8) + 4;
-  n.row = kernels->row[n.dimension - 2];
-  n.reaction = kernels->reaction[n.dimension - 2];
   memset(to, 0, sizeof *to);
   TRY(rve_contacts_create(from->counts.slot_rows * from->counts.lanes, &contacts));
   for (rve_slot_start(from, &slot); rve_slot_next(&slot);) {

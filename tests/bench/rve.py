@@ -25,6 +25,7 @@ import time
 import codes
 
 TOLERANCE = 0.04  # of an end stress, from the median of all codes: 400 grains part ways after 20,000 steps
+GPU_WARPS = 16, 8, 4  # of a block, at most; the first is the default
 FEWEST_ROUNDS = 3  # of which a median can be taken, whatever the time
 TUNING_STEPS, TUNING_TRIES = 4000, 2  # the same for all codes
 # Floating-point operations and bytes moved per particle-step, a + b * slots; counted from the kernels' source in
@@ -228,16 +229,19 @@ def ratios(table, ours):
 
 
 def gpu(build, folder):
-    """The job in a batch on the device; a warm-up is in the first repetition."""
-    result = {"date": datetime.datetime.now().isoformat(timespec="seconds"), "particle_steps_per_second": {}, "runs": []}
+    """The job in a batch on the device, with blocks of up to 16 warps (the default), 8 and 4; a warm-up is in the first repetition."""
+    result = {"date": datetime.datetime.now().isoformat(timespec="seconds"), "particle_steps_per_second": {}, "by_warps": {}, "runs": []}
     for dimension, rves, steps in ((2, 1584, 2000), (3, 528, 1000)):
-        run = codes.last_json(codes.execute(
-            [build / "bench" / "bench_rve_shear", codes.DATA[dimension], dimension, "backend", "cuda", "rves", rves, "steps",
-             steps, "call", 500, "repeat", 4], sorted(os.sched_getaffinity(0)), folder))
-        rate = run["grains"] * rves * steps / statistics.median(run["seconds"][1:])
-        result["particle_steps_per_second"][f"cuda_{dimension}d"] = rate
-        result["runs"].append(run)
-        print(f"  {run['backend']} {dimension}D {rves} RVEs: {rate:.3g} particle-steps/s", flush=True)
+        for warps in GPU_WARPS:
+            run = codes.last_json(codes.execute(
+                [build / "bench" / "bench_rve_shear", codes.DATA[dimension], dimension, "backend", "cuda", "rves", rves, "steps",
+                 steps, "call", 500, "repeat", 4], sorted(os.sched_getaffinity(0)), folder, DEMPM_CUDA_WARPS=str(warps)))
+            rate = run["grains"] * rves * steps / statistics.median(run["seconds"][1:])
+            if warps == GPU_WARPS[0]:
+                result["particle_steps_per_second"][f"cuda_{dimension}d"] = rate
+            result["by_warps"][f"cuda_{dimension}d_{warps}"] = rate
+            result["runs"].append({"warps": warps, **run})
+            print(f"  {run['backend']} {dimension}D {rves} RVEs, {warps} warps: {rate:.3g} particle-steps/s", flush=True)
     (folder / "gpu.json").write_text(json.dumps(result, indent=1) + "\n")
     return 0
 
