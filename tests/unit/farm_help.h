@@ -3,8 +3,9 @@
 #ifndef DEMPM_FARM_HELP_H
 #define DEMPM_FARM_HELP_H
 
+#include "mpi_test.h" /* first */
+
 #include "backend_help.h"
-#include "mpi_test.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* The RVE farm on devices. Without one (a real one, or its source on the host: tests/cuda_host) the tests are skipped. */
-#define _POSIX_C_SOURCE 200809L
+/* The RVE farm on devices that are too small. They need the device's source on the host (tests/cuda_host), which refuses memory when it is
+ * asked to; elsewhere they are skipped. */
 #include "farm_help.h"
 
-#define NEED_A_DEVICE() \
-  do {                  \
-    if (!rve_device_present()) skip(); \
+#include "device_help.h"
+
+#define NEED_A_DEVICE_THAT_REFUSES() \
+  do {                               \
+    if (!help_device_is_on_host()) skip(); \
   } while (0)
 
 /* Largest deviation of an entry of the answers, over the largest such entry. */
@@ -27,7 +29,6 @@ static int runs_on(const RveLaw *law, const char *name) {
   return strncmp(rve_law_backend_name(law), name, strlen(name)) == 0;
 }
 
-/* The stand-in for a device refuses memory by this variable; a real one ignores it, and nobody leaves then. */
 static void refuse_memory(int rank) {
   if (mpi_test_rank() == rank) setenv("DEMPM_CUDA_HOST_MEMORY", "1", 1);
 }
@@ -35,7 +36,7 @@ static void refuse_memory(int rank) {
 /* Half of the points first; then one rank's device has no room for the others, and all ranks go on on the CPU. */
 static void all_ranks_leave_a_device_that_is_too_small_for_one(void **state) {
   (void)state;
-  NEED_A_DEVICE();
+  NEED_A_DEVICE_THAT_REFUSES();
   const RveScene scene = make_scene();
   static double expected[TAGS * ANSWER], found[TAGS * ANSWER];
   int alive[TAGS] = {0};
@@ -63,7 +64,7 @@ static void all_ranks_leave_a_device_that_is_too_small_for_one(void **state) {
 
 static void a_record_goes_on_where_there_is_no_room_for_it(void **state) {
   (void)state;
-  NEED_A_DEVICE();
+  NEED_A_DEVICE_THAT_REFUSES();
   const RveScene scene = make_scene();
   static double expected[TAGS * ANSWER], found[TAGS * ANSWER];
   int alive[TAGS];

@@ -3,6 +3,8 @@
  * tests/cuda_host) there is nothing to compare, and the tests say so. */
 #include "rve_help.h"
 
+#include "device_help.h"
+
 enum { SIZES = 3, RVES = 5, CALLS = 3 };
 typedef enum Physics { FRICTIONLESS, FRICTION, DASHPOTS, BONDS, PHYSICS } Physics;
 
@@ -12,6 +14,14 @@ typedef enum Physics { FRICTIONLESS, FRICTION, DASHPOTS, BONDS, PHYSICS } Physic
       print_message("           no device\n"); \
       skip();                    \
     }                            \
+  } while (0)
+
+#define NEED_A_DEVICE_THAT_REFUSES() \
+  do {                               \
+    if (!help_device_is_on_host()) { \
+      print_message("           no device that refuses memory\n"); \
+      skip();                        \
+    }                                \
   } while (0)
 
 static RveScene scene_of(int dimension, Physics physics) {
@@ -240,7 +250,7 @@ static void refuse_memory(int from_now_on) {
 
 static void a_device_without_room_hands_a_new_batch_to_the_cpu(void **state) {
   (void)state;
-  NEED_A_DEVICE();
+  NEED_A_DEVICE_THAT_REFUSES();
   RvePacking packing[SIZES];
   RveAnswer expected[RVES], found[RVES];
   const RveScene scene = scene_of(2, BONDS);
@@ -264,7 +274,7 @@ static void a_device_without_room_hands_a_new_batch_to_the_cpu(void **state) {
  * get the same input, and must not be taken for twins. */
 static void a_device_that_becomes_too_small_hands_over_to_the_cpu(void **state) {
   (void)state;
-  NEED_A_DEVICE();
+  NEED_A_DEVICE_THAT_REFUSES();
   const int which[RVES] = {0, 1, 0, 0, 1};
   RvePacking packing[2] = {make_ring(2.155e-3), help_random(2, 7, 2e4, 70)};
   RveScene scene = scene_of(2, BONDS);
