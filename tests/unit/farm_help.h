@@ -179,6 +179,21 @@ HELP int same_answers(const double *a, const double *b, const int *alive) {
   return 1;
 }
 
+/* The record on all ranks of MPI_COMM_WORLD; law is over MPI_COMM_WORLD. */
+HELP BaseStatus pack_for_all(RveLaw *law, char **bytes, size_t *size) {
+  void *record;
+  uint64_t total;
+  TRY(rve_law_pack(law, &record, size));
+  total = *size;
+  MPI_Bcast(&total, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+  *size = (size_t)total;
+  TRY(BASE_ALLOC(*size, bytes));
+  if (record) memcpy(*bytes, record, *size);
+  base_free(record);
+  MPI_Bcast(*bytes, (int)*size, MPI_BYTE, 0, MPI_COMM_WORLD);
+  return BASE_OK;
+}
+
 HELP void all_alive(int *alive) {
   for (int k = 0; k < TAGS; k++) alive[k] = 1;
 }

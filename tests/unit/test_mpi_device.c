@@ -68,17 +68,13 @@ static void a_record_goes_on_where_there_is_no_room_for_it(void **state) {
   const RveScene scene = make_scene();
   static double expected[TAGS * ANSWER], found[TAGS * ANSWER];
   int alive[TAGS];
-  void *bytes;
+  char *bytes;
   size_t size;
   RveLaw *law, *restored;
   all_alive(alive);
   CHECK_ALL(rve_law_create(MPI_COMM_WORLD, &scene, packing, PACKINGS, RVE_BACKEND_CUDA, &law) == BASE_OK);
   CHECK_ALL(law_step(law, MPI_COMM_WORLD, alive, 0, time_step, 0, expected) == BASE_OK);
-  CHECK_ALL(rve_law_pack(law, &bytes, &size) == BASE_OK);
-  MPI_Bcast(&size, sizeof size, MPI_BYTE, 0, MPI_COMM_WORLD);
-  if (mpi_test_rank() > 0) CHECK_ALL(base_alloc(size, 1, &bytes) == BASE_OK);
-  else CHECK_ALL(bytes != NULL);
-  MPI_Bcast(bytes, (int)size, MPI_BYTE, 0, MPI_COMM_WORLD);
+  CHECK_ALL(pack_for_all(law, &bytes, &size) == BASE_OK);
   CHECK_ALL(law_step(law, MPI_COMM_WORLD, alive, 1, time_step, 0, expected) == BASE_OK && runs_on(law, "cuda"));
 
   refuse_memory(0);

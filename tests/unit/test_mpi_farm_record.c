@@ -2,21 +2,6 @@
 /* Records of the RVE farm: written on some ranks, read on others, the same from any, refused on all if one is wrong. */
 #include "farm_help.h"
 
-/* The record on all ranks of MPI_COMM_WORLD; law is over MPI_COMM_WORLD. */
-static BaseStatus pack_for_all(RveLaw *law, char **bytes, size_t *size) {
-  void *record;
-  uint64_t total;
-  TRY(rve_law_pack(law, &record, size));
-  total = *size;
-  MPI_Bcast(&total, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
-  *size = (size_t)total;
-  TRY(BASE_ALLOC(*size, bytes));
-  if (record) memcpy(*bytes, record, *size);
-  base_free(record);
-  MPI_Bcast(*bytes, (int)*size, MPI_BYTE, 0, MPI_COMM_WORLD);
-  return BASE_OK;
-}
-
 static void a_restart_on_other_ranks_continues_bit_for_bit(void **state) {
   (void)state;
   const RveScene scene = make_scene();
