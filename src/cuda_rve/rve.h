@@ -151,7 +151,8 @@ int rve_batch_count(const RveBatch *batch);
 enum { RVE_BACKEND_BYTES = 24 }; /* room for a backend's name and its final zero */
 const char *rve_batch_backend_name(const RveBatch *batch); /* "cpu/avx512", "cpu/avx512_mixed", "cpu/avx2", "cpu/plain", "cuda" */
 int rve_batch_is_on_device(const RveBatch *batch);
-/* All RVEs go on on the CPU: the same states, other last bits. Nothing without a device. BASE_ERROR_MEMORY, BASE_ERROR_DEVICE: they stay. */
+/* All RVEs go on on the CPU: the same states, other last bits. Nothing without a device. BASE_ERROR_MEMORY,
+ * BASE_ERROR_DEVICE: the batch is of no use then. */
 BaseStatus rve_batch_leave_device(RveBatch *batch);
 const RveScene *rve_batch_scene(const RveBatch *batch);
 /* May change material parameters (friction, damping, substeps, bonds' strengths, threads, time step) between steps; refuses a change of

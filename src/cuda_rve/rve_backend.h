@@ -39,7 +39,7 @@ typedef struct RveDeviceJob {
 
 BaseStatus rve_device_create(const RveKernels **layout, RveDevice **device);
 void rve_device_destroy(RveDevice *device);
-/* (Re)places RVE k's arena on the device by a copy of the host's `arena`. After an error the device has none. */
+/* (Re)places RVE k's arena on the device by a copy of the host's `arena`. After BASE_ERROR_MEMORY the device has none. */
 BaseStatus rve_device_upload(RveDevice *device, int rve, const RveCounts *counts, size_t bytes, const void *arena);
 int rve_device_holds(const RveDevice *device, int rve); /* 1 if RVE k's arena is there */
 BaseStatus rve_device_download(RveDevice *device, int rve, void *arena);

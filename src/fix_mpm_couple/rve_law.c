@@ -50,7 +50,7 @@ BaseStatus rve_law_create(MPI_Comm comm, const RveScene *scene, const RvePacking
   law->node_threads = rank_threads(comm);
   law->backend = backend == RVE_BACKEND_AUTO && !rve_device_present() ? RVE_BACKEND_CPU : backend;
   const RveScene resolved = with_threads(scene, law->node_threads);
-  status = rve_store_create(&resolved, packings, packing_count, backend, &law->store);
+  status = rve_store_create(&resolved, packings, packing_count, law->backend, &law->store);
   TRY_GOTO(rank_agree(law->comm, status, rank), status, fail);
   TRY_GOTO(rve_farm_create(law->comm, &law->farm), status, fail);
   *result = law;

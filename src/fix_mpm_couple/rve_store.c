@@ -80,7 +80,7 @@ BaseStatus rve_store_create(const RveScene *scene, const RvePacking *packings, i
   TRY(rve_scene_check(scene));
   TRY(BASE_ALLOC(1, &store));
   store->scene = *scene;
-  store->backend = backend == RVE_BACKEND_AUTO && !rve_device_present() ? RVE_BACKEND_CPU : backend;
+  store->backend = backend;
   store->unused = -1;
   TRY_GOTO(copy_packings(store, packings, packing_count), status, fail);
   *result = store;
@@ -368,10 +368,10 @@ void rve_store_totals(const RveStore *store, RveStoreTotals *totals) {
 }
 
 int rve_store_left_device(const RveStore *store) {
-  int left = 0;
-  for (int b = 0; b < store->batches && store->backend != RVE_BACKEND_CPU; b++)
-    left += !rve_batch_is_on_device(store->batch[b]);
-  return left > 0;
+  if (store->backend == RVE_BACKEND_CPU) return 0;
+  for (int b = 0; b < store->batches; b++)
+    if (!rve_batch_is_on_device(store->batch[b])) return 1;
+  return 0;
 }
 
 BaseStatus rve_store_leave_device(RveStore *store) {

@@ -69,7 +69,7 @@ typedef struct RveStoreTotals {
   double seconds;         /* wall time in the RVE engine's steps since then */
 } RveStoreTotals;
 void rve_store_totals(const RveStore *store, RveStoreTotals *totals);
-/* 1 if a device was to be used, but does not hold all RVEs: its memory is too small. */
+/* 1 if a device was to be used (any backend but CPU), but does not hold all RVEs: its memory is too small. */
 int rve_store_left_device(const RveStore *store);
 BaseStatus rve_store_leave_device(RveStore *store); /* all RVEs go on on the CPU, new ones too */
 const char *rve_store_backend_name(const RveStore *store); /* "" without RVEs */

@@ -7,6 +7,16 @@
 
 #include "cuda_rve/rve.h"
 
+#define SKIP_WITHOUT(there, what)                    \
+  do {                                               \
+    if (!(there)) {                                  \
+      print_message("           no %s\n", what);     \
+      skip();                                        \
+    }                                                \
+  } while (0)
+#define NEED_A_DEVICE() SKIP_WITHOUT(rve_device_present(), "device")
+#define NEED_A_DEVICE_THAT_REFUSES() SKIP_WITHOUT(help_device_is_on_host(), "device that refuses memory")
+
 /* 1 if the device is its source on the host (tests/cuda_host), which refuses memory when asked to: it alone can be made to say that it
  * is not there. */
 static inline int help_device_is_on_host(void) {

@@ -5,11 +5,6 @@
 
 #include "device_help.h"
 
-#define NEED_A_DEVICE_THAT_REFUSES() \
-  do {                               \
-    if (!help_device_is_on_host()) skip(); \
-  } while (0)
-
 /* Largest deviation of an entry of the answers, over the largest such entry. */
 static double deviation(const double *a, const double *b, const int *alive) {
   double worst = 0.0;

@@ -159,8 +159,8 @@ class Study:
     def read(self, path, done, grains):
         log = (path / "log.liggghts").read_text(errors="replace")
         thermo = parse_thermo(log)
-        told = re.findall(r"^Fix \S+: (\d+) RVEs of", log, re.M)
-        points = int(thermo[-1]["Atoms"][0]) if thermo and "Atoms" in thermo[-1] else int(told[-1]) if told else 0
+        told = thermo[-1]["Atoms"][:1] if thermo and "Atoms" in thermo[-1] else re.findall(r"^Fix \S+: (\d+) RVEs of", log, re.M)[-1:]
+        points = int(told[0]) if told else 0
         particle_steps = thermo[-1].get("mpm[12]", [0])[-1] if thermo else 0
         dem_steps = round(particle_steps / (points * grains)) if points and grains else 0
         return Run(path, done["seconds"], done.get("processor", 0.0), points, grains, dem_steps, thermo)
