@@ -67,7 +67,13 @@ ISA_avx2 = $(FUSE) -mavx2 -mfma
 ISA_avx512 = $(FUSE) -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512 -mtune=skylake-avx512 \
              -fno-tree-pre
 ISA_avx512_mixed = $(ISA_avx512)
-KERNEL_OBJECTS := $(if $(KERNEL_SOURCE),$(ISAS:%=$(BUILD)/isa/%.o))
+# A row of 2D is one long piece of code. Ordered before registers are given out, by the latency of its instructions, it is 1.05 to 1.1
+# times as fast; ordering it again afterwards loses half of that. In 3D, whose rows are computed in short loops, it is slower.
+ORDER_avx512_2d = -fschedule-insns -fno-schedule-insns2
+ORDER_avx512_mixed_2d = $(ORDER_avx512_2d)
+KERNELS := $(ISAS:%=%_2d) $(ISAS:%=%_3d)
+KERNEL_FLAGS = $(ISA_$(patsubst %_2d,%,$(patsubst %_3d,%,$1))) $(ORDER_$1)
+KERNEL_OBJECTS := $(if $(KERNEL_SOURCE),$(KERNELS:%=$(BUILD)/isa/%.o))
 
 LIBRARY := $(BUILD)/libdempm.a
 C_OBJECTS := $(C_SOURCES:src/%.c=$(BUILD)/%.o) $(KERNEL_OBJECTS) $(CU_SOURCES:src/%.cu=$(BUILD)/%.cu.o)
@@ -91,7 +97,7 @@ programs: $(PROGRAMS) $(LIBRARY)
 # Objects depend on the packages' stamp by order only, and on a file that changes when the flags do.
 READY = $(BUILD)/flags | $(BUILD)/packages
 $(BUILD)/flags: FORCE | $(BUILD)/packages
-	@mkdir -p $(@D); echo '$(C_FLAGS) | $(foreach i,$(ISAS),$(ISA_$i)) | $(CXX_FLAGS) | $(NVCC_FLAGS)' > $@.now; \
+	@mkdir -p $(@D); echo '$(C_FLAGS) | $(foreach k,$(KERNELS),$(call KERNEL_FLAGS,$k)) | $(CXX_FLAGS) | $(NVCC_FLAGS)' > $@.now; \
 	 if cmp -s $@ $@.now; then rm $@.now; else mv $@.now $@; fi
 
 $(BUILD)/%.o: src/%.c $(READY)
@@ -105,7 +111,8 @@ $(BUILD)/fix_mpm_couple/%.o: src/fix_mpm_couple/%.cpp $(READY)
 	$(SHOW) $(MPICXX) $(CXX_FLAGS) -c $< -o $@
 $(BUILD)/isa/%.o: $(KERNEL_SOURCE) $(READY)
 	@mkdir -p $(@D)
-	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -c $< -o $@
+	$(SHOW) $(CC) $(C_FLAGS) $(call KERNEL_FLAGS,$*) -DRVE_ISA=$(patsubst %_2d,%,$(patsubst %_3d,%,$*)) \
+	  -DRVE_DIMENSION=$(if $(filter %_2d,$*),2,3) -c $< -o $@
 $(BUILD)/%.cu.o: src/%.cu $(READY)
 	@mkdir -p $(@D)
 	$(SHOW) $(NVCC) $(NVCC_FLAGS) -MMD -MP -MF $(BUILD)/$*.cu.d -c $< -o $@
@@ -135,7 +142,7 @@ $(BUILD)/bench/%: tests/bench/%.c $(BENCH_OBJECTS) $(LIBRARY)
 	$(SHOW) $(CC) $(C_FLAGS) -Isrc $(filter %.c %.o %.a,$^) $(C_LIBS) -o $@
 $(BUILD)/bench/isa/%.o: tests/bench/isa.c $(READY)
 	@mkdir -p $(@D)
-	$(SHOW) $(CC) $(C_FLAGS) $(ISA_$*) -DRVE_ISA=$* -Isrc -c $< -o $@
+	$(SHOW) $(CC) $(C_FLAGS) $(call KERNEL_FLAGS,$*_2d) -DRVE_ISA=$* -Isrc -c $< -o $@
 .SECONDARY: $(BENCH_OBJECTS)
 # The device's source on the host: a fiber for each of its threads, see tests/cuda_host/cuda_runtime.h.
 $(BUILD)/cuda_host/device.o: src/cuda_rve/rve_backend_cuda.cu tests/cuda_host/cuda_runtime.h $(READY)

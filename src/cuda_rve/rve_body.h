@@ -39,8 +39,10 @@ RVE_FN RveBody rve_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
   return own;
 }
 
-/* Fractional branch s_j - s_i + P along cell edge k, in units. */
-RVE_FN rve_int rve_fraction(rve_int si, rve_int sj, rve_int image, int k) {
+/* Fractional branch s_j - s_i + P along cell edge k, in units. Where it is shorter than half an edge (wide), whole edges
+ * leave a number of 64 bits by themselves: in units of 2^-64 edges. */
+RVE_FN rve_int rve_fraction(int wide, rve_int si, rve_int sj, rve_int image, int k) {
+  if (wide) return rve_int_shift_left(rve_int_subtract(sj, si), 4);
   const rve_int top = rve_set_int((int64_t)((uint64_t)15 << 60));
   const rve_int shift =
       k == 0 ? rve_int_shift_left(image, 60)
@@ -48,11 +50,14 @@ RVE_FN rve_int rve_fraction(rve_int si, rve_int sj, rve_int image, int k) {
   return rve_int_add(rve_int_subtract(sj, si), shift);
 }
 
-/* x_j - x_i; h: H times RVE_UNIT. */
-RVE_FN void rve_branch(int dim, const rve_real h[9], const rve_int si[3], const rve_int sj[3], rve_int image,
+/* The unit of rve_fraction(), cell edges. */
+RVE_FN double rve_fraction_unit(int wide) { return wide ? RVE_UNIT / 16.0 : RVE_UNIT; }
+
+/* x_j - x_i; h: H times the unit. */
+RVE_FN void rve_branch(int dim, int wide, const rve_real h[9], const rve_int si[3], const rve_int sj[3], rve_int image,
                        rve_real d[3]) {
   rve_real x[3];
-  for (int k = 0; k < dim; k++) x[k] = rve_real_from_int(rve_fraction(si[k], sj[k], image, k));
+  for (int k = 0; k < dim; k++) x[k] = rve_real_from_int(rve_fraction(wide, si[k], sj[k], image, k));
   for (int k = 0; k < dim; k++) {
     d[k] = h[3 * k] * x[0] + h[3 * k + 1] * x[1];
     if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
@@ -270,14 +275,14 @@ RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const R
 }
 
 /* The rounding of H alone would stretch all branches of a direction alike. */
-RVE_FN void near_branch(int dim, const rve_near h[18], const near_int si[3], const near_int sj[3], near_image image,
+RVE_FN void near_branch(int dim, int wide, const rve_near h[18], const near_int si[3], const near_int sj[3], near_image image,
                         rve_near d[3]) {
   const rve_int low = _mm512_cvtepu16_epi64(_mm256_castsi256_si128(image)),
                 high = _mm512_cvtepu16_epi64(_mm256_extracti128_si256(image, 1));
   rve_near x[3];
   for (int k = 0; k < dim; k++)
-    x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(si[k].half[0], sj[k].half[0], low, k)),
-                     _mm512_cvtepi64_ps(rve_fraction(si[k].half[1], sj[k].half[1], high, k)));
+    x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(wide, si[k].half[0], sj[k].half[0], low, k)),
+                     _mm512_cvtepi64_ps(rve_fraction(wide, si[k].half[1], sj[k].half[1], high, k)));
   for (int k = 0; k < dim; k++) {
     d[k] = h[9 + 3 * k] * x[0] + h[9 + 3 * k + 1] * x[1];
     if (dim == 3) d[k] = d[k] + h[9 + 3 * k + 2] * x[2];

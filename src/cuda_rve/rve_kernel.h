@@ -13,7 +13,7 @@
 /* --------------------------------------------------------------------------------------------------- contact pass */
 
 typedef struct RveContactPass {
-  rve_near h[9 * RVE_PARTS]; /* H times RVE_UNIT; in FP32 also what its rounding left */
+  rve_near h[9 * RVE_PARTS]; /* H times rve_fraction_unit(); in FP32 also what its rounding left */
   rve_near rate[9]; /* D */
   rve_near turn[9];
   rve_near kn, kt_dt, kt, mu, dt, gn, gt, gc, bond, bond_ratio;
@@ -29,10 +29,10 @@ RVE_FN double rve_bond_force_factor(const RveCall *call, double temperature) {
   return call->bond_strength * left * call->normal_stiffness;
 }
 
-RVE_FN RveContactPass rve_contact_pass_of(const RveCall *call, const RveHead *head, double dt) {
+RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, const RveHead *head, double dt) {
   RveContactPass c;
   for (int k = 0; k < 9; k++) {
-    const double h = head->cell[k] * RVE_UNIT;
+    const double h = head->cell[k] * rve_fraction_unit(ft.wide);
     c.h[k] = near_set(h);
     if (RVE_PARTS == 2) c.h[9 + k] = near_set(h - (float)h);
     c.rate[k] = near_set(call->rate[k]);
@@ -115,15 +115,13 @@ typedef struct RveRow {
 } RveRow;
 
 /* First part: where the neighbours are, and whether any touches. */
-RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own, int lane0,
-                    RveRow *row) {
-  RveNearBody other;
+RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own,
+                    const RveNearBody *other, int lane0, RveRow *row) {
   rve_near d[3];
-  const near_image image = near_load_image(a->image, lane0);
-  near_neighbour_place(ft, a, lane0, &other);
-  near_branch(ft.dimension, c->h, own->s, other.s, image, d);
+  const near_image image = near_load_image(a->image, lane0); /* wide: nobody reads it */
+  near_branch(ft.dimension, ft.wide, c->h, own->s, other->s, image, d);
   const rve_near square = near_dot(ft.dimension, d, d), inverse = near_inverse_sqrt(square);
-  const rve_near overlap = own->r + other.r - square * inverse;
+  const rve_near overlap = own->r + other->r - square * inverse;
   row->lane0 = lane0;
   row->touch = row->bonded = near_less(near_set(0.0), overlap);
   if (ft.bonds) {
@@ -131,7 +129,7 @@ RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a,
     row->bonded = near_image_any(image, RVE_IMAGE_BOND);
     row->touch = near_or(row->touch, row->bonded);
   }
-  near_keep_place(ft, &other, &row->other);
+  near_keep_place(ft, other, &row->other);
   for (int k = 0; k < ft.dimension; k++) row->n[k] = d[k] * inverse;
   for (int k = 0; ft.dimension == 2 && k < 2; k++) row->d[k] = d[k];
   row->overlap = overlap;
@@ -269,7 +267,9 @@ RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const Rv
     for (; at < a->slot_first[block + 1] && rows < RVE_CHUNK; at++) {
       if (head->approach < a->idle_until[at]) continue;
       const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
-      if (rve_meet(ft, c, a, &own, at * RVE_PACK, &row[rows])) rows++;
+      RveNearBody other;
+      near_neighbour_place(ft, a, at * RVE_PACK, &other);
+      if (rve_meet(ft, c, a, &own, &other, at * RVE_PACK, &row[rows])) rows++;
       else rve_clear(ft, n, a, &row[rows]), rve_rest(head, a, &row[rows]);
     }
     if (ft.tangential || ft.viscous)
@@ -284,13 +284,38 @@ RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const Rv
   }
 }
 
+/* The rows of a pass that do not rest, one after the other. CPUs read a row's neighbours while they work on the row before:
+ * their schedulers are too small to find that work by themselves behind the chain of a row. */
+typedef struct RveRows {
+  int row, end;
+  RveNearBody other; /* of this row; CUDA, whose threads hide latency: unused */
+} RveRows;
+
+RVE_FN void rve_find_row(RveFeatures ft, const RveHead *head, const RveArrays *a, int from, RveRows *rows) {
+  rows->row = from;
+  while (rows->row < rows->end && head->approach < a->idle_until[rows->row]) rows->row++;
+  /* Behind the last row any will do: a condition would keep the compiler from mixing this with other work. */
+  if (RVE_AHEAD) near_neighbour_place(ft, a, (rows->row < rows->end ? rows->row : 0) * RVE_PACK, &rows->other);
+}
+
+RVE_FN RveNearBody rve_take_row(RveFeatures ft, const RveHead *head, const RveArrays *a, RveRows *rows) {
+  RveNearBody other = rows->other;
+  if (!RVE_AHEAD) near_neighbour_place(ft, a, rows->row * RVE_PACK, &other);
+  rve_find_row(ft, head, a, rows->row + 1, rows);
+  return other;
+}
+
 /* The same where a row's numbers fit the registers: 2D, and a thread of CUDA. */
 RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveCounts *n,
-                             const RveArrays *a, int block, const RveNearBody *own, RveContactSums *sum) {
-  for (int at = a->slot_first[block]; at < a->slot_first[block + 1]; at++) {
+                             const RveArrays *a, int block, const RveNearBody *own, RveRows *rows,
+                             RveContactSums *sum) {
+  const int stop = a->slot_first[block + 1];
+  if (!RVE_AHEAD) rows->end = stop, rve_find_row(ft, head, a, a->slot_first[block], rows);
+  while (rows->row < stop) {
     RveRow row;
-    if (head->approach < a->idle_until[at]) continue;
-    const int touching = rve_meet(ft, c, a, own, at * RVE_PACK, &row);
+    const int at = rows->row;
+    const RveNearBody other = rve_take_row(ft, head, a, rows);
+    const int touching = rve_meet(ft, c, a, own, &other, at * RVE_PACK, &row);
     if (ft.tangential || ft.viscous) rve_slide(ft, c, a, own, &row);
     rve_add_contact(ft, c, n, a, own, &row, sum);
     if (!touching) rve_rest(head, a, &row); /* asked last: the compiler may not mix what stands before and behind */
@@ -320,20 +345,22 @@ RVE_FN void rve_fetch_ahead(RveScratch *s) {
 #endif
 }
 
-/* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
- */
-RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
-                             const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
-  const RveContactPass c = rve_contact_pass_of(call, head, dt);
+RVE_FN void rve_contact_blocks(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
+                               const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
+  const RveContactPass c = rve_contact_pass_of(ft, call, head, dt);
+  const int chunks = RVE_CHUNK > 1 && ft.dimension == 3;
   RveContactSums sum;
+  RveRows rows;
+  rows.row = 0, rows.end = a->slot_first[n->blocks];
+  if (RVE_AHEAD && !chunks && rows.end > 0) rve_find_row(ft, head, a, 0, &rows);
   sum.slid = sum.lost = near_set(0.0);
   for (int block = team->pack; block < n->blocks; block += team->packs) {
     const int lane0 = block * RVE_PACK;
     const RveNearBody own = near_own_body(ft, a, lane0);
     rve_fetch_ahead(s);
     for (int k = 0; k < 3; k++) sum.force[k] = sum.torque[k] = near_set(0.0);
-    if (RVE_CHUNK > 1 && ft.dimension == 3) rve_contact_chunks(ft, &c, head, n, a, block, &sum);
-    else rve_contact_rows(ft, &c, head, n, a, block, &own, &sum);
+    if (chunks) rve_contact_chunks(ft, &c, head, n, a, block, &sum);
+    else rve_contact_rows(ft, &c, head, n, a, block, &own, &rows, &sum);
     for (int k = 0; k < ft.dimension; k++) near_store(a->force[k], lane0, sum.force[k]);
     for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->torque[k], lane0, sum.torque[k]);
   }
@@ -341,14 +368,29 @@ RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall 
   *loss = *loss + near_sum_wide(sum.lost);
 }
 
-/* ------------------------------------------------------------------------------------------------------ move pass */
+/* Where a pass without images is worth a form of its own: bonds need the images' word anyway, in 3D it gains nothing. */
+RVE_FN int rve_may_be_wide(RveFeatures ft) { return RVE_ROWS && ft.dimension == 2 && !ft.bonds; }
 
-RVE_FN rve_real rve_sign_like(rve_real magnitude, rve_real power) { /* +magnitude where power >= 0 */
-  return rve_select(rve_less(power, rve_set(0.0)), rve_set(0.0) - magnitude, magnitude);
+/* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
+ */
+RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
+                             const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
+  if (rve_may_be_wide(ft) && head->wide) {
+    ft.wide = 1;
+    rve_contact_blocks(ft, team, call, head, dt, n, a, s, slip, loss);
+    return;
+  }
+  ft.wide = 0;
+  rve_contact_blocks(ft, team, call, head, dt, n, a, s, slip, loss);
 }
 
-/* Cundall's damping of one component; adds the power it takes. */
-RVE_FN rve_real rve_damp(rve_real alpha, rve_real f, rve_real v) { return f - rve_sign_like(alpha, f * v) * f; }
+/* ------------------------------------------------------------------------------------------------------ move pass */
+
+/* Cundall's damping of one component: alpha |f| against the power f v, along f where that is 0 (+ 0.0: also where it is
+ * -0). */
+RVE_FN rve_real rve_damp(rve_real alpha, rve_real f, rve_real v) {
+  return f - rve_copy_sign(alpha, f * v + rve_set(0.0)) * f;
+}
 
 /* What a span of grains has in the move pass. */
 typedef struct RveSpanForce {
@@ -356,11 +398,11 @@ typedef struct RveSpanForce {
 } RveSpanForce;
 
 typedef struct RveMove {
-  rve_real drift[9], lag[9], dt, half_dt, alpha, scale;
+  rve_real drift[9], lag[9], dt, alpha, scale;
   int damped;
 } RveMove;
 
-/* Kicks and drifts one span of grains. fastest: largest v^2; loss: work of local damping, J. */
+/* Kicks and drifts one span of grains. fastest: largest v^2; loss: twice the power of local damping, W. */
 RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int thermal, const RveArrays *a, int lane0,
                      const RveSpanForce *sum, rve_real *fastest, rve_real *loss) {
   const int dim = ft.dimension, spins = ft.tangential ? rve_spins(ft) : 0;
@@ -373,14 +415,14 @@ RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int thermal, const RveArr
     b.v[k] = old.v[k] + used * per_mass - m->lag[3 * k] * old.v[0] - m->lag[3 * k + 1] * old.v[1];
     if (dim == 3) b.v[k] = b.v[k] - m->lag[3 * k + 2] * old.v[2];
     rve_store(a->velocity[k], lane0, b.v[k]);
-    if (m->damped) *loss = *loss + (f - used) * (old.v[k] + b.v[k]) * m->half_dt;
+    if (m->damped) *loss = *loss + (f - used) * (old.v[k] + b.v[k]);
   }
   for (int k = 0; k < spins; k++) {
     const rve_real torque = sum->torque[k] + rve_load(a->torque[k], lane0), w = rve_load(a->spin[k], lane0);
     const rve_real used = m->damped ? rve_damp(m->alpha, torque, w) : torque;
     b.w[k] = w + used * rve_load(a->inverse_inertia, lane0) * m->dt;
     rve_store(a->spin[k], lane0, b.w[k]);
-    if (m->damped) *loss = *loss + (torque - used) * (w + b.w[k]) * m->half_dt;
+    if (m->damped) *loss = *loss + (torque - used) * (w + b.w[k]);
   }
   if (!ft.tangential)
     for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], lane0);
@@ -406,7 +448,7 @@ RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *ca
                           const RveCounts *n, const RveArrays *a, rve_real *fastest, rve_real *loss) {
   const int spans = n->blocks * RVE_PARTS, chunk = ft.dimension == 2 ? RVE_CHUNK : 1;
   RveMove m;
-  m.dt = rve_set(call->dt), m.half_dt = rve_set(0.5 * call->dt), m.scale = rve_set(scale);
+  m.dt = rve_set(call->dt), m.scale = rve_set(scale);
   m.alpha = rve_set(call->local_damping), m.damped = call->local_damping > 0.0;
   for (int k = 0; k < 9; k++) {
     m.drift[k] = rve_set(head->inverse[k] * call->dt * (double)RVE_ONE);

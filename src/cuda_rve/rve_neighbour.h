@@ -4,47 +4,10 @@
 #ifndef DEMPM_RVE_NEIGHBOUR_H
 #define DEMPM_RVE_NEIGHBOUR_H
 
-#include "rve_state.h"
+#include "rve_cell.h"
 
 enum { RVE_SEARCH_CHUNK = 32 };
 #define RVE_NEAR_SKIN 0.02 /* of the skin: pairs closer than this share rows with contacts */
-
-RVE_FN double rve_row_norm(const double m[9], int row) {
-  return sqrt(m[3 * row] * m[3 * row] + m[3 * row + 1] * m[3 * row + 1] + m[3 * row + 2] * m[3 * row + 2]);
-}
-
-RVE_FN void rve_invert(const double a[9], double b[9]) {
-  const double c0 = a[4] * a[8] - a[5] * a[7], c1 = a[5] * a[6] - a[3] * a[8], c2 = a[3] * a[7] - a[4] * a[6];
-  const double s = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
-  b[0] = s * c0;
-  b[1] = s * (a[2] * a[7] - a[1] * a[8]);
-  b[2] = s * (a[1] * a[5] - a[2] * a[4]);
-  b[3] = s * c1;
-  b[4] = s * (a[0] * a[8] - a[2] * a[6]);
-  b[5] = s * (a[2] * a[3] - a[0] * a[5]);
-  b[6] = s * c2;
-  b[7] = s * (a[1] * a[6] - a[0] * a[7]);
-  b[8] = s * (a[0] * a[4] - a[1] * a[3]);
-}
-
-/* Least stretch of the affine flow since the list: F = H H_list^-1, smallest singular value >= sqrt(1 - |F'F - 1|). */
-RVE_FN double rve_least_stretch(const RveHead *head) {
-  double inverse[9], f[9], sum = 0.0;
-  rve_invert(head->cell_at_list, inverse);
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      f[3 * i + j] = 0.0;
-      for (int k = 0; k < 3; k++) f[3 * i + j] += head->cell[3 * i + k] * inverse[3 * k + j];
-    }
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      double c = i == j ? -1.0 : 0.0;
-      for (int k = 0; k < 3; k++) c += f[3 * k + i] * f[3 * k + j];
-      sum += c * c;
-    }
-  sum = sqrt(sum);
-  return sum < 1.0 ? sqrt(1.0 - sum) : 0.0;
-}
 
 /* How far two grains may move towards each other before a pair outside the list can touch. A pair outside was farther
  * than (Ri + Rj) g0 + skin; it is now farther than stretch ((Ri + Rj) g0 + skin) - movement and touches at (Ri + Rj) g.
@@ -71,73 +34,6 @@ RVE_FN double rve_farthest(int dim, const RveTeam *team, const RveHead *head, co
     farthest = rve_max(farthest, square);
   }
   return sqrt(rve_team_max(team, farthest));
-}
-
-/* -------------------------------------------------------------------------------------------------- exact changes */
-
-/* Wraps positions into [-1/2, 1/2) and moves the shifts of all slots along, so that no branch changes. 0 if a shift
- * does not fit. */
-RVE_FN int rve_wrap(const RveCounts *n, const RveArrays *a) {
-  const int stride = n->row ? n->row : 1;
-  int fits = 1;
-  for (int block = 0; block < n->blocks; block++)
-    for (int row = a->slot_first[block]; row < a->slot_first[block + 1]; row++)
-      for (int lane = 0; lane < RVE_PACK; lane++) {
-        const int slot = row * RVE_PACK + lane, i = block * RVE_PACK + lane;
-        const uint16_t image = a->image[slot];
-        if (image & RVE_IMAGE_VOID) continue;
-        const int j = (int)a->neighbour[slot] / stride;
-        int p[3];
-        rve_image_unpack(image, p);
-        for (int k = 0; k < n->dimension; k++)
-          p[k] += (int)((a->position[k][j] + RVE_ONE / 2) >> 60) - (int)((a->position[k][i] + RVE_ONE / 2) >> 60);
-        fits &= rve_image_fits(p);
-        a->image[slot] = (uint16_t)(rve_image_pack(p) | (image & 0xf000));
-      }
-  for (int k = 0; k < n->dimension; k++)
-    for (int i = 0; i < n->blocks * RVE_PACK; i++)
-      a->position[k][i] -= ((a->position[k][i] + RVE_ONE / 2) >> 60) * RVE_ONE;
-  return fits;
-}
-
-/* H' = H M, s' = M^-1 s, P' = M^-1 P with integer M = "column a minus t times column b". */
-RVE_FN int rve_shear_cell(int ca, int cb, int t, RveHead *head, const RveCounts *n, const RveArrays *a) {
-  int fits = 1;
-  for (int k = 0; k < 3; k++) head->cell[3 * k + ca] -= t * head->cell[3 * k + cb];
-  for (int i = 0; i < n->blocks * RVE_PACK; i++) a->position[cb][i] += t * a->position[ca][i];
-  for (int slot = 0; slot < a->slot_first[n->blocks] * RVE_PACK; slot++) {
-    const uint16_t image = a->image[slot];
-    int p[3];
-    if (image & RVE_IMAGE_VOID) continue;
-    rve_image_unpack(image, p);
-    p[cb] += t * p[ca];
-    fits &= p[cb] >= -7 && p[cb] <= 7; /* large only until the wrap that follows */
-    a->image[slot] = (uint16_t)(rve_image_pack(p) | (image & 0xf000));
-  }
-  return fits;
-}
-
-/* Reduces a cell that large shear has skewed: no cell vector's projection on another exceeds half of that. Exact for
- * positions, contacts and histories. 0 if a shift does not fit (the cell is too narrow). */
-RVE_FN int rve_reduce_cell(RveHead *head, const RveCounts *n, const RveArrays *a) {
-  int fits = rve_wrap(n, a), changed = 1;
-  double *h = head->cell;
-  for (int sweep = 0; sweep < 200 && changed && fits; sweep++) {
-    changed = 0;
-    for (int ca = 0; ca < n->dimension; ca++)
-      for (int cb = 0; cb < n->dimension; cb++) {
-        if (ca == cb) continue;
-        double ab = 0.0, bb = 0.0;
-        for (int k = 0; k < 3; k++) ab += h[3 * k + ca] * h[3 * k + cb], bb += h[3 * k + cb] * h[3 * k + cb];
-        const double t = ab / bb;
-        if (!(fabs(t) > 0.5 + 1e-9)) continue; /* also for NaN */
-        const int whole = t > 1.5 ? 2 : t < -1.5 ? -2 : t > 0.0 ? 1 : -1;
-        fits &= rve_shear_cell(ca, cb, whole, head, n, a) && rve_wrap(n, a);
-        changed = 1;
-      }
-  }
-  rve_invert(h, head->inverse);
-  return fits;
 }
 
 /* -------------------------------------------------------------------------------------------------------------
@@ -464,6 +360,47 @@ RVE_FN int rve_attach_saved(const RveCounts *n, RveScratch *s, int pairs, int sa
   return pairs;
 }
 
+/* ------------------------------------------------------------------------------------------------------- wide cells */
+
+/* 1 if no listed pair's fractional branch reaches half a cell edge while the list holds. Pairs outside must move by the
+ * skin to touch, which is when the list is spent; the flow leaves fractions as they are. */
+RVE_FN int rve_is_wide(const RveHead *head, int dimension) {
+  const double longest = (2.0 * head->radius_max * head->scale_at_list + 2.0 * head->skin) * (1.0 + 1e-9);
+  int wide = RVE_ROWS && dimension == 2; /* rve_may_be_wide() */
+  for (int k = 0; k < dimension; k++) wide &= longest * rve_row_norm(head->inverse, k) < 0.499;
+  return wide;
+}
+
+/* A grain that grain i cannot touch while the list holds, by a large grain's radius at the list's time; -1 if there is none. */
+RVE_FN int rve_stranger(const RveHead *head, const RveCounts *n, const RveArrays *a, int i) {
+  const double widest = 3.0 * head->radius_max * head->scale_at_list + head->skin;
+  for (int c = 0; c < n->grains; c++) {
+    const int j = (i + n->grains / 2 + c) % n->grains;
+    double square = 0.0, x[3] = {0.0, 0.0, 0.0};
+    for (int k = 0; k < n->dimension; k++)
+      x[k] = (double)(int64_t)(((uint64_t)a->position[k][j] - (uint64_t)a->position[k][i]) << 4) * (RVE_UNIT / 16.0);
+    for (int k = 0; k < n->dimension; k++) {
+      const double d = head->cell[3 * k] * x[0] + head->cell[3 * k + 1] * x[1] + head->cell[3 * k + 2] * x[2];
+      square += d * d;
+    }
+    if (square > widest * widest) return j;
+  }
+  return -1;
+}
+
+/* Without images an empty slot cannot lie cells away: it names a grain that is not near. Returns 0 if some grain has none. */
+RVE_FN int rve_name_strangers(const RveHead *head, const RveCounts *n, const RveArrays *a) {
+  const int stride = n->row ? n->row : 1;
+  for (int block = 0; block < n->blocks; block++)
+    for (int slot = a->slot_first[block] * RVE_PACK; slot < a->slot_first[block + 1] * RVE_PACK; slot++) {
+      if (!(a->image[slot] & RVE_IMAGE_VOID)) continue;
+      const int j = rve_stranger(head, n, a, block * RVE_PACK + slot % RVE_PACK);
+      if (j < 0) return 0;
+      a->neighbour[slot] = (uint32_t)(j * stride);
+    }
+  return 1;
+}
+
 enum { RVE_LIST_BUILT, RVE_LIST_TOO_SMALL, RVE_LIST_FAILED };
 
 /* The width of the shell of neighbours: fixed, or halved and doubled until lists last some hundred steps. */
@@ -502,6 +439,7 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   }
   rve_reorder(n, a, s);
   rve_fill_slots(n, a, s, pairs);
+  head->wide = call->resting && rve_is_wide(head, n->dimension) && rve_name_strangers(head, n, a);
   for (int k = 0; k < 9; k++) head->cell_at_list[k] = head->cell[k];
   head->reach = 0.0;
   head->approach = call->resting ? 0.0 : 1e300; /* later than any row rests */

@@ -57,7 +57,8 @@ typedef struct RveHead {
   int32_t failed;   /* BASE_ERROR_UNSTABLE after the watchdog spoke, for ever */
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
-  int32_t apart;    /* no grains touch, no bond holds and no force is left: the next call may be a free flight */
+  int16_t apart;    /* no grains touch, no bond holds and no force is left: the next call may be a free flight */
+  int16_t wide;     /* each pair of the list is its nearest images' while the list holds, see rve_is_wide() */
   int32_t flew;     /* the last call was one */
   double approach;   /* m: no gap between two grains has shrunk by more since the list was built; never falls */
 } RveHead;
@@ -110,6 +111,7 @@ typedef struct RveCall {
 /* Which parts of the kernel a scene needs; constants in the stamped-out variants. */
 typedef struct RveFeatures {
   int dimension, tangential, viscous, bonds;
+  int wide; /* RveHead.wide: only contact passes look */
 } RveFeatures;
 
 /* Working memory of a list's construction, for n grains and `pairs` candidate pairs. */

@@ -123,7 +123,7 @@ RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *ca
   if (team->leader) {
     for (int k = 0; k < 9; k++) head->rate[k] = call->rate[k];
     head->friction_work += kt > 0.0 ? slid / kt : 0.0;
-    head->damping_work += dashed * call->dt + damped;
+    head->damping_work += (dashed + 0.5 * damped) * call->dt;
     if (outcome == RVE_DONE) head->done = 0;
   }
   rve_sync();

@@ -91,6 +91,10 @@ RVE_FN rve_real rve_sqrt(rve_real a) { return _mm512_sqrt_pd(a); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return _mm512_min_pd(a, b); }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return _mm512_max_pd(a, b); }
 RVE_FN rve_real rve_abs(rve_real a) { return _mm512_abs_pd(a); }
+RVE_FN rve_real rve_copy_sign(rve_real a, rve_real sign) { /* a >= 0 */
+  const __m512i top = _mm512_set1_epi64(INT64_MIN), s = _mm512_castpd_si512(sign), b = _mm512_castpd_si512(a);
+  return _mm512_castsi512_pd(_mm512_ternarylogic_epi64(top, s, b, 0xca));
+}
 /* a, or +-most where it is further from 0; most >= 0. */
 RVE_FN rve_real rve_limit(rve_real a, rve_real most) { return _mm512_range_pd(a, most, 2); }
 RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); }
@@ -159,6 +163,7 @@ RVE_FN rve_real rve_sqrt(rve_real a) { return _mm256_sqrt_pd(a); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return _mm256_min_pd(a, b); }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return _mm256_max_pd(a, b); }
 RVE_FN rve_real rve_abs(rve_real a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
+RVE_FN rve_real rve_copy_sign(rve_real a, rve_real sign) { return _mm256_or_pd(_mm256_and_pd(_mm256_set1_pd(-0.0), sign), a); }
 RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return _mm256_cmp_pd(a, b, _CMP_LT_OQ); }
 RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return _mm256_and_pd(a, b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return _mm256_or_pd(a, b); }
@@ -221,6 +226,7 @@ RVE_FN rve_real rve_sqrt(rve_real a) { return sqrt(a); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return a < b ? a : b; }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return a > b ? a : b; }
 RVE_FN rve_real rve_abs(rve_real a) { return fabs(a); }
+RVE_FN rve_real rve_copy_sign(rve_real a, rve_real sign) { return copysign(a, sign); }
 RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return a < b; }
 RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return a & b; }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return a | b; }
@@ -260,9 +266,9 @@ enum { RVE_REACTION = 4 / RVE_PARTS }; /* doubles from one slot to the next in R
 RVE_FN int rve_row_doubles(int dimension) { return RVE_ROWS * 4 * (RVE_PARTS == 2 ? dimension - 1 : dimension); }
 /* Rows of slots whose contacts are computed part by part, see RveRow. */
 #if defined(__CUDACC__)
-enum { RVE_CHUNK = 1 };
+enum { RVE_CHUNK = 1, RVE_AHEAD = 0 };
 #else
-enum { RVE_CHUNK = 4 };
+enum { RVE_CHUNK = 4, RVE_AHEAD = 1 /* see RveRows */ };
 #endif
 
 /* 1/sqrt(a) to round-off. */

@@ -16,7 +16,7 @@
 
 static int only_2d(const RveCall *call, void *arena, const RveCounts *counts, RveScratch *scratch) {
   static const RveTeam alone = {0, 1, 1, 0};
-  const RveFeatures ft = {2, 1, 0, 0};
+  const RveFeatures ft = {2, 1, 0, 0, 0};
   RveCounts n = *counts;
   RveCall bare = *call;
   RveArrays a;

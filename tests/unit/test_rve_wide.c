@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* Cells so wide that no pair of the list reaches half a cell edge go without images (RveHead.wide). That such a list may do
+ * so in every call; that narrow cells do not; that empty slots never touch. The same bits either way: test_rve_resting.c. */
+#include "cuda_rve/rve_batch_private.h"
+#include "rve_help.h"
+
+enum { STRAINS = 60 };
+
+/* Nearest image of s_j - s_i, in units of a cell edge / 2^60; what the kernel takes in its stead. */
+static int64_t nearest(int64_t si, int64_t sj) { return (int64_t)(((uint64_t)sj - (uint64_t)si) << 4) / 16; }
+
+/* Pairs whose image is not the nearest one's. */
+static int strays(const RveRecord *record, int *pairs, int *empty) {
+  const RveCounts *n = &record->counts;
+  const RveArrays *a = &record->arrays;
+  int found = 0;
+  for (int block = 0; block < n->blocks; block++)
+    for (int slot = a->slot_first[block] * n->lanes; slot < a->slot_first[block + 1] * n->lanes; slot++) {
+      const int i = block * n->lanes + slot % n->lanes, j = (int)a->neighbour[slot] / (n->row ? n->row : 1);
+      int p[3], stray = 0;
+      rve_image_unpack(a->image[slot], p);
+      if (a->image[slot] & RVE_IMAGE_VOID) {
+        *empty += 1, found += j == i;
+        continue;
+      }
+      for (int k = 0; k < n->dimension; k++)
+        stray |= a->position[k][j] - a->position[k][i] + p[k] * RVE_ONE != nearest(a->position[k][i], a->position[k][j]);
+      *pairs += 1, found += stray;
+    }
+  return found;
+}
+
+static RveBatch *batch_of(const RvePacking *packing, int resting) {
+  RveScene scene = help_scene(packing->dimension);
+  RveBatch *batch;
+  scene.tangential_stiffness = 1e6, scene.local_damping = 0.2;
+  scene.resting = resting;
+  MUST(rve_batch_create(&scene, packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch));
+  return batch;
+}
+
+/* Far beyond several reductions of the cell: sheared by 12, squeezed, stretched. */
+static void images_are_the_nearest(void **state) {
+  (void)state;
+  const double motion[3][9] = {{0, 40, 0, 0, 0, 0, 0, 0, 0}, {-20, 0, 0, 0, 20, 0, 0, 0, 0}, {20, -10, 0, 5, -20, 0, 0, 0, 0}};
+  const int sides[2] = {20, 12};
+  for (int c = 0; c < 2; c++) {
+    RvePacking packing = help_random(2, sides[c], 2e4, 7);
+    RveBatch *batch = batch_of(&packing, 1);
+    int pairs = 0, empty = 0, wide = 0;
+    for (int call = 0; call < STRAINS; call++) {
+      help_step(batch, motion[3 * call / STRAINS], 0.0, 5e-3);
+      const RveRecord *record = &batch->record[0];
+      wide += rve_head(record->arena)->wide;
+      if (!rve_head(record->arena)->wide) continue;
+      const int found = strays(record, &pairs, &empty);
+      if (found > 0) fail_msg("%d grains, call %d: %d slots are not the nearest images'", packing.grains, call, found);
+    }
+    printf("%d grains: wide after %d of %d calls, %d pairs and %d empty slots seen\n", packing.grains, wide, STRAINS, pairs, empty);
+    assert_true(wide > STRAINS / 2 && pairs > 0 && empty > 0);
+    rve_batch_destroy(batch);
+    rve_packing_destroy(&packing);
+  }
+}
+
+static void narrow_cells_keep_their_images(void **state) {
+  (void)state;
+  for (int n = 1; n <= 2; n++) {
+    RvePacking packing = help_crystal(HELP_HEXAGONAL, n, 3e-3, 1e-3);
+    RveBatch *batch = batch_of(&packing, 1);
+    help_step(batch, NULL, 0.0, 1e-3);
+    assert_int_equal(rve_head(batch->record[0].arena)->wide, 0);
+    rve_batch_destroy(batch);
+    rve_packing_destroy(&packing);
+  }
+  RvePacking packing = help_random(2, 12, 2e4, 7);
+  RveBatch *batch = batch_of(&packing, 0); /* asked for */
+  help_step(batch, NULL, 0.0, 1e-3);
+  assert_int_equal(rve_head(batch->record[0].arena)->wide, 0);
+  rve_batch_destroy(batch);
+  rve_packing_destroy(&packing);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(images_are_the_nearest), cmocka_unit_test(narrow_cells_keep_their_images)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
