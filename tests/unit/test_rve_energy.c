@@ -193,6 +193,28 @@ static void a_collision_restores_speed_and_a_dashpot_takes_its_part(void **state
   }
 }
 
+/* Where a grain has no velocity of either sign, local damping weakens its force, whichever way that points. */
+static void local_damping_weakens_forces_from_rest(void **state) {
+  (void)state;
+  const double overlap = 1e-5, alpha = 0.5, dt = 1e-6;
+  for (int swap = 0; swap < 2; swap++) {
+    RveScene scene = help_scene(2);
+    RvePacking packing = pair_of_grains(-overlap, swap ? -0.0 : 0.0, 0.0);
+    const double expected = (1.0 - alpha) * scene.normal_stiffness * overlap / mass_of(&scene, 5e-3) * dt;
+    RveView view;
+    scene.local_damping = alpha, scene.time_step = dt;
+    RveBatch *batch = help_batch(&scene, &packing);
+    help_step(batch, NULL, 0.0, 0.0);
+    help_step(batch, NULL, 0.0, dt);
+    MUST(rve_batch_view(batch, 0, &view));
+    assert_true(fabs(view.velocity[0] + expected) <= 1e-9 * expected && fabs(view.velocity[3] - expected) <= 1e-9 * expected);
+    assert_true(view.velocity[0] == -view.velocity[3]);
+    rve_view_destroy(&view);
+    rve_batch_destroy(batch);
+    rve_packing_destroy(&packing);
+  }
+}
+
 static void a_sliding_collision_conserves_angular_momentum_and_heats(void **state) {
   (void)state;
   const double still[9] = {0.0};
@@ -233,6 +255,7 @@ int main(void) {
       cmocka_unit_test(power_of_the_stress_is_contact_power_and_kinetic_rate),
       cmocka_unit_test(energy_is_accounted_for),
       cmocka_unit_test(a_collision_restores_speed_and_a_dashpot_takes_its_part),
+      cmocka_unit_test(local_damping_weakens_forces_from_rest),
       cmocka_unit_test(a_sliding_collision_conserves_angular_momentum_and_heats),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -47,6 +47,7 @@ static void images_are_the_nearest(void **state) {
   for (int c = 0; c < 2; c++) {
     RvePacking packing = help_random(2, sides[c], 2e4, 7);
     RveBatch *batch = batch_of(&packing, 1);
+    const int lanes = batch->record[0].counts.lanes; /* with one there are no empty slots */
     int pairs = 0, empty = 0, wide = 0;
     for (int call = 0; call < STRAINS; call++) {
       help_step(batch, motion[3 * call / STRAINS], 0.0, 5e-3);
@@ -57,7 +58,7 @@ static void images_are_the_nearest(void **state) {
       if (found > 0) fail_msg("%d grains, call %d: %d slots are not the nearest images'", packing.grains, call, found);
     }
     printf("%d grains: wide after %d of %d calls, %d pairs and %d empty slots seen\n", packing.grains, wide, STRAINS, pairs, empty);
-    assert_true(wide > STRAINS / 2 && pairs > 0 && empty > 0);
+    assert_true(wide > STRAINS / 2 && pairs > 0 && (empty > 0 || lanes == 1));
     rve_batch_destroy(batch);
     rve_packing_destroy(&packing);
   }
