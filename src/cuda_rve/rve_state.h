@@ -8,7 +8,7 @@
  * The list. Grains are sorted by degree and dealt in blocks of `lanes`; grain i of block b owns the slots (row, i mod
  * lanes) of the rows slot_first[b] .. slot_first[b+1]. Each contact has exactly one slot, at the grain that "owns" it
  * (degrees are balanced); the other grain finds it in its incoming list. A slot without contact names its own grain,
- * many cells away.
+ * many cells away, or in wide cells (RveHead.wide), whose images nobody reads, one that is not near.
  *
  * Pairs that touch or nearly do come first in a block's rows, the others have rows of their own. A row of which no pair
  * touches rests until its nearest pair may: idle_until says when, on the clock of RveHead.approach. */
@@ -58,7 +58,7 @@ typedef struct RveHead {
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
   int16_t apart;    /* no grains touch, no bond holds and no force is left: the next call may be a free flight */
-  int16_t wide;     /* each pair of the list is its nearest images' while the list holds, see rve_is_wide() */
+  int16_t wide;     /* each pair of the list is that of nearest images while the list holds, see rve_is_wide() */
   int32_t flew;     /* the last call was one */
   double approach;   /* m: no gap between two grains has shrunk by more since the list was built; never falls */
 } RveHead;
