@@ -299,8 +299,9 @@ RVE_FN void rve_find_row(RveFeatures ft, const RveHead *head, const RveArrays *a
 }
 
 RVE_FN RveNearBody rve_take_row(RveFeatures ft, const RveHead *head, const RveArrays *a, RveRows *rows) {
-  RveNearBody other = rows->other;
-  if (!RVE_AHEAD) near_neighbour_place(ft, a, rows->row * RVE_PACK, &other);
+  RveNearBody other;
+  if (RVE_AHEAD) other = rows->other;
+  else near_neighbour_place(ft, a, rows->row * RVE_PACK, &other);
   rve_find_row(ft, head, a, rows->row + 1, rows);
   return other;
 }
@@ -368,14 +369,11 @@ RVE_FN void rve_contact_blocks(RveFeatures ft, const RveTeam *team, const RveCal
   *loss = *loss + near_sum_wide(sum.lost);
 }
 
-/* Where a pass without images is worth a form of its own: bonds need the images' word anyway, in 3D it gains nothing. */
-RVE_FN int rve_may_be_wide(RveFeatures ft) { return RVE_ROWS && ft.dimension == 2 && !ft.bonds; }
-
 /* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
  */
 RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
                              const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
-  if (rve_may_be_wide(ft) && head->wide) {
+  if (rve_may_be_wide(ft.dimension) && !ft.bonds && head->wide) { /* bonds need the images' word anyway */
     ft.wide = 1;
     rve_contact_blocks(ft, team, call, head, dt, n, a, s, slip, loss);
     return;

@@ -366,7 +366,7 @@ RVE_FN int rve_attach_saved(const RveCounts *n, RveScratch *s, int pairs, int sa
  * skin to touch, which is when the list is spent; the flow leaves fractions as they are. */
 RVE_FN int rve_is_wide(const RveHead *head, int dimension) {
   const double longest = (2.0 * head->radius_max * head->scale_at_list + 2.0 * head->skin) * (1.0 + 1e-9);
-  int wide = RVE_ROWS && dimension == 2; /* rve_may_be_wide() */
+  int wide = rve_may_be_wide(dimension);
   for (int k = 0; k < dimension; k++) wide &= longest * rve_row_norm(head->inverse, k) < 0.499;
   return wide;
 }

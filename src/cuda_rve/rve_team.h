@@ -163,7 +163,9 @@ RVE_FN rve_real rve_sqrt(rve_real a) { return _mm256_sqrt_pd(a); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return _mm256_min_pd(a, b); }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return _mm256_max_pd(a, b); }
 RVE_FN rve_real rve_abs(rve_real a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
-RVE_FN rve_real rve_copy_sign(rve_real a, rve_real sign) { return _mm256_or_pd(_mm256_and_pd(_mm256_set1_pd(-0.0), sign), a); }
+RVE_FN rve_real rve_copy_sign(rve_real a, rve_real sign) { /* a >= 0 */
+  return _mm256_or_pd(_mm256_and_pd(_mm256_set1_pd(-0.0), sign), a);
+}
 RVE_FN rve_mask rve_less(rve_real a, rve_real b) { return _mm256_cmp_pd(a, b, _CMP_LT_OQ); }
 RVE_FN rve_mask rve_and(rve_mask a, rve_mask b) { return _mm256_and_pd(a, b); }
 RVE_FN rve_mask rve_or(rve_mask a, rve_mask b) { return _mm256_or_pd(a, b); }
@@ -270,6 +272,8 @@ enum { RVE_CHUNK = 1, RVE_AHEAD = 0 };
 #else
 enum { RVE_CHUNK = 4, RVE_AHEAD = 1 /* see RveRows */ };
 #endif
+/* 1 where lists of wide cells (RveHead.wide) are worth a form of the contact pass of their own: in 3D it gains nothing. */
+RVE_FN int rve_may_be_wide(int dimension) { return RVE_ROWS && dimension == 2; }
 
 /* 1/sqrt(a) to round-off. */
 #if defined(RVE_ISA_AVX512)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Cells so wide that no pair of the list reaches half a cell edge go without images (RveHead.wide). That such a list may do
- * so in every call; that narrow cells do not; that empty slots never touch. The same bits either way: test_rve_resting.c. */
+ * so in every call; that narrow cells do not; that empty slots name another grain. The same bits either way, and that those
+ * never touch: test_rve_resting.c. */
 #include "cuda_rve/rve_batch_private.h"
 #include "rve_help.h"
 
