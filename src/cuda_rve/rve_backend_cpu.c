@@ -51,8 +51,10 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
   measure_table[variant_of(ft)](call, arena, n, work, duration, answer);
 }
 
-#ifdef RVE_MIXED
+#if defined(RVE_MIXED)
 #define ROWS {4, 8}, {2, 3} /* rve_row_doubles() */
+#elif defined(RVE_GATHERS)
+#define ROWS {4, 8}, {4, 6}
 #else
 #define ROWS {8, 12}, {4, 6}
 #endif

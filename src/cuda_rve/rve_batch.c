@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Batches of RVEs: creation, stepping over threads. */
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -10,6 +13,22 @@
 
 /* -------------------------------------------------------------------------------------------------- which kernels */
 
+#if defined(__x86_64__)
+/* Intel's processors from Sapphire Rapids on, the first with AVX512-FP16; on their predecessors and on a Zen 4 gathers are slow. */
+static int gathers_are_fast(void) {
+  unsigned a, b, c, d;
+  return __builtin_cpu_is("intel") && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (d >> 23 & 1);
+}
+
+/* What the variable asks for, or the best. */
+static const RveKernels *avx512_kernels(const char *wanted, int mixed) {
+  if (mixed) return &rve_kernels_avx512_mixed;
+  if (wanted && strcmp(wanted, "avx512") == 0) return &rve_kernels_avx512;
+  if (wanted && strcmp(wanted, "avx512_gather") == 0) return &rve_kernels_avx512_gather;
+  return gathers_are_fast() ? &rve_kernels_avx512_gather : &rve_kernels_avx512;
+}
+#endif
+
 const RveKernels *rve_batch_host_kernels(const RveScene *scene) {
   const RveKernels *best = &rve_kernels_plain;
 #if defined(__x86_64__)
@@ -18,9 +37,11 @@ const RveKernels *rve_batch_host_kernels(const RveScene *scene) {
   const int has512 = has2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
                      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
   if (has2) best = &rve_kernels_avx2;
-  if (has512) best = scene->mixed ? &rve_kernels_avx512_mixed : &rve_kernels_avx512;
+  if (has512) best = avx512_kernels(wanted, scene->mixed);
   if (wanted && strcmp(wanted, "plain") == 0) best = &rve_kernels_plain;
   if (wanted && strcmp(wanted, "avx2") == 0 && has2) best = &rve_kernels_avx2;
+#else
+  (void)scene;
 #endif
   return best;
 }

@@ -72,6 +72,56 @@ typedef RveBody RveNearBody;
 #define near_branch rve_branch
 #define near_dot rve_dot
 
+#if defined(RVE_GATHERS)
+/* Rows are 2D s v, 3D s v_x | v_y v_z w_x w_y; what else is wanted comes from the arrays. */
+
+/* Places and radii of neighbours (2D: and all else); then the rest. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  const double *const none[4] = {0, 0, 0, 0};
+  const RveQuad q = rve_gather(a->row, none, a->neighbour, lane0);
+  const int dim = ft.dimension, stride = rve_row_doubles(dim);
+  for (int k = 0; k < dim; k++) other->s[k] = rve_int_from_bits(q.f[k]);
+  for (int k = dim; k < 4; k++) other->v[k - dim] = q.f[k];
+  other->r = rve_pick(a->radius, a->neighbour, lane0, stride);
+  if (dim == 3) return;
+  if (ft.tangential) other->w[0] = rve_pick(a->spin[0], a->neighbour, lane0, stride);
+  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, stride);
+}
+
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  if (ft.dimension == 2) return;
+  const double *const none[4] = {0, 0, 0, 0};
+  const RveQuad q = rve_gather(a->row + 4, none, a->neighbour, lane0);
+  const int stride = rve_row_doubles(3);
+  for (int k = 0; k < 2; k++) other->v[k + 1] = q.f[k], other->w[k] = q.f[k + 2];
+  if (ft.tangential) other->w[2] = rve_pick(a->spin[2], a->neighbour, lane0, stride);
+  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, stride);
+}
+
+/* Of what near_neighbour_place has read, what is still needed once the branch is known. */
+RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
+  kept->r = other->r;
+  for (int k = ft.dimension; k < 4; k++) kept->v[k - ft.dimension] = other->v[k - ft.dimension];
+  if (ft.dimension == 3) return;
+  if (ft.tangential) kept->w[0] = other->w[0];
+  if (ft.viscous) kept->m = other->m;
+}
+
+RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
+  double *const none[4] = {0, 0, 0, 0};
+  const int stride = rve_row_doubles(dimension);
+  RveQuad q;
+  for (int k = 0; k < dimension; k++) q.f[k] = rve_bits_from_int(b->s[k]);
+  for (int k = dimension; k < 4; k++) q.f[k] = b->v[k - dimension];
+  rve_scatter(a->row, stride, none, lane0, q);
+  if (dimension == 2) return;
+  const RveQuad p = {{b->v[1], b->v[2], b->w[0], b->w[1]}};
+  rve_scatter(a->row + 4, stride, none, lane0, p);
+}
+
+#else
+/* Rows have all that contacts ask for: 2D s v | w r m, 3D s r | v m | w. */
+
 /* Places and radii of neighbours (2D: and all else, their rows are short); then the rest. */
 RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   if (ft.dimension == 2) {
@@ -113,13 +163,6 @@ RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept)
   kept->w[0] = other->w[0], kept->m = other->m;
 }
 
-RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveBody other;
-  near_neighbour_place(ft, a, lane0, &other);
-  near_neighbour_motion(ft, a, lane0, &other);
-  return other;
-}
-
 /* Writes the rows (or nothing, where arrays are read directly) of the pack at lane0. */
 RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
   if (!RVE_ROWS) return;
@@ -139,6 +182,15 @@ RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const R
     rve_scatter(rows + 4, stride, none, lane0, p);
     rve_scatter(rows + 8, stride, none, lane0, t);
   }
+}
+
+#endif
+
+RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveBody other;
+  near_neighbour_place(ft, a, lane0, &other);
+  near_neighbour_motion(ft, a, lane0, &other);
+  return other;
 }
 
 RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RvePair *p) {

@@ -52,7 +52,7 @@ RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, c
   return c;
 }
 
-/* Coulomb's cap, mu |fn|. Springs alone push wherever grains touch; what other lanes get is dropped later. */
+/* Coulomb's cap, mu |fn|. Springs alone only push. */
 RVE_FN rve_near rve_cap(RveFeatures ft, const RveContactPass *c, rve_near fn) {
   return c->mu * (ft.viscous || ft.bonds ? near_abs(fn) : fn);
 }
@@ -109,7 +109,7 @@ RVE_FN near_mask rve_breaking(const RveContactPass *c, near_mask bonded, rve_nea
 typedef struct RveRow {
   int lane0;
   near_image image;
-  near_mask touch, bonded; /* touch: or bonded */
+  near_mask touch, bonded; /* touch: or bonded; with bonds only */
   RveNearBody other;
   rve_near d[2], n[3], overlap, opening, slide[3], trial[3]; /* d, the branch: 2D */
 } RveRow;
@@ -122,18 +122,18 @@ RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a,
   near_branch(ft.dimension, ft.wide, c->h, own->s, other->s, image, d);
   const rve_near square = near_dot(ft.dimension, d, d), inverse = near_inverse_sqrt(square);
   const rve_near overlap = own->r + other->r - square * inverse;
+  near_mask touch = near_less(near_set(0.0), overlap);
   row->lane0 = lane0;
-  row->touch = row->bonded = near_less(near_set(0.0), overlap);
   if (ft.bonds) {
     row->image = image;
     row->bonded = near_image_any(image, RVE_IMAGE_BOND);
-    row->touch = near_or(row->touch, row->bonded);
+    row->touch = touch = near_or(touch, row->bonded);
   }
   near_keep_place(ft, other, &row->other);
   for (int k = 0; k < ft.dimension; k++) row->n[k] = d[k] * inverse;
   for (int k = 0; ft.dimension == 2 && k < 2; k++) row->d[k] = d[k];
   row->overlap = overlap;
-  return near_any(row->touch);
+  return near_any(touch);
 }
 
 /* Nothing touches in this row, and what it left is 0. The margin covers the rounding of FP32. */
@@ -158,9 +158,12 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
   const rve_near half = near_set(0.5), *const n = row->n;
   const rve_near lever = own->r - half * row->overlap, other_lever = row->other.r - half * row->overlap;
   rve_near u[3], w[3], old[3], trial[3];
-  near_neighbour_motion(ft, a, row->lane0, &row->other);
+  RveNearBody other; /* of its own: what is not wanted later need not go to memory */
+  near_keep_place(ft, &row->other, &other);
+  near_neighbour_motion(ft, a, row->lane0, &other);
+  if (ft.viscous) row->other.m = other.m;
   for (int k = 0; k < dim; k++) {
-    u[k] = row->other.v[k] - own->v[k];
+    u[k] = other.v[k] - own->v[k];
     if (dim == 2) u[k] = u[k] + c->rate[3 * k] * row->d[0] + c->rate[3 * k + 1] * row->d[1];
     else
       u[k] = u[k] + (lever + other_lever) * near_dot(3, c->rate + 3 * k, n); /* keeping d, too, takes longer */
@@ -168,7 +171,7 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
   if (ft.viscous) row->opening = near_dot(dim, u, n);
   if (!ft.tangential) return;
   for (int k = 0; k < rve_spins(ft); k++) {
-    w[k] = lever * own->w[k] + other_lever * row->other.w[k];
+    w[k] = lever * own->w[k] + other_lever * other.w[k];
     old[k] = near_load(a->shear[k], row->lane0);
   }
   if (dim == 2) {
@@ -200,8 +203,9 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
                            const RveRow *row, rve_near *slip, rve_near *loss) {
   const int dim = ft.dimension;
   const rve_near zero = near_set(0.0), half = near_set(0.5), overlap = row->overlap, *const n = row->n;
-  near_mask touch = row->touch, bonded = row->bonded;
+  near_mask touch = near_less(zero, overlap), bonded = touch;
   rve_near fn = c->kn * overlap, gt = zero, trial2 = zero, total[3];
+  if (ft.bonds) touch = row->touch, bonded = row->bonded;
   if (ft.viscous) {
     const rve_near effective = own->m * row->other.m / (own->m + row->other.m);
     const rve_near opening = row->opening, gn = c->gn * effective + c->gc * near_sqrt(effective);
@@ -209,6 +213,8 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
     *loss = *loss + near_keep(touch, gn * opening * opening);
     gt = c->gt * effective;
   }
+  const int springs = !ft.viscous && !ft.bonds; /* push only where grains touch; so the cap is 0 elsewhere, too */
+  if (springs) fn = near_keep(touch, fn);
   RvePair p;
   if (ft.tangential && dim == 2) trial2 = row->trial[0] * row->trial[0];
   else if (ft.tangential) trial2 = near_dot(3, row->trial, row->trial);
@@ -231,7 +237,7 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
     }
     for (int k = 0; k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, spring[k]);
   }
-  fn = near_keep(touch, fn);
+  if (!springs) fn = near_keep(touch, fn);
   for (int k = 0; k < dim; k++) p.push[k] = fn * n[k];
   if (ft.tangential) {
     if (dim == 2) {
@@ -397,11 +403,10 @@ typedef struct RveSpanForce {
 
 typedef struct RveMove {
   rve_real drift[9], lag[9], dt, alpha, scale;
-  int damped;
 } RveMove;
 
 /* Kicks and drifts one span of grains. fastest: largest v^2; loss: twice the power of local damping, W. */
-RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int thermal, const RveArrays *a, int lane0,
+RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int damped, int thermal, const RveArrays *a, int lane0,
                      const RveSpanForce *sum, rve_real *fastest, rve_real *loss) {
   const int dim = ft.dimension, spins = ft.tangential ? rve_spins(ft) : 0;
   RveBody b, old;
@@ -409,18 +414,18 @@ RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int thermal, const RveArr
   const rve_real per_mass = rve_load(a->inverse_mass, lane0) * m->dt;
   for (int k = 0; k < dim; k++) {
     const rve_real f = sum->force[k] + rve_load(a->force[k], lane0);
-    const rve_real used = m->damped ? rve_damp(m->alpha, f, old.v[k]) : f;
+    const rve_real used = damped ? rve_damp(m->alpha, f, old.v[k]) : f;
     b.v[k] = old.v[k] + used * per_mass - m->lag[3 * k] * old.v[0] - m->lag[3 * k + 1] * old.v[1];
     if (dim == 3) b.v[k] = b.v[k] - m->lag[3 * k + 2] * old.v[2];
     rve_store(a->velocity[k], lane0, b.v[k]);
-    if (m->damped) *loss = *loss + (f - used) * (old.v[k] + b.v[k]);
+    if (damped) *loss = *loss + (f - used) * (old.v[k] + b.v[k]);
   }
   for (int k = 0; k < spins; k++) {
     const rve_real torque = sum->torque[k] + rve_load(a->torque[k], lane0), w = rve_load(a->spin[k], lane0);
-    const rve_real used = m->damped ? rve_damp(m->alpha, torque, w) : torque;
+    const rve_real used = damped ? rve_damp(m->alpha, torque, w) : torque;
     b.w[k] = w + used * rve_load(a->inverse_inertia, lane0) * m->dt;
     rve_store(a->spin[k], lane0, b.w[k]);
-    if (m->damped) *loss = *loss + (torque - used) * (w + b.w[k]);
+    if (damped) *loss = *loss + (torque - used) * (w + b.w[k]);
   }
   if (!ft.tangential)
     for (int k = 0; k < rve_spins(ft); k++) b.w[k] = rve_load(a->spin[k], lane0);
@@ -442,24 +447,30 @@ RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int thermal, const RveArr
 }
 
 /* Sums forces, kicks, drifts; as with contacts, the first part runs ahead for several spans. */
-RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double scale,
-                          const RveCounts *n, const RveArrays *a, rve_real *fastest, rve_real *loss) {
+RVE_FN void rve_move_spans(RveFeatures ft, const RveMove *m, int damped, int thermal, const RveTeam *team, const RveHead *head,
+                           const RveCounts *n, const RveArrays *a, rve_real *fastest, rve_real *loss) {
   const int spans = n->blocks * RVE_PARTS, chunk = ft.dimension == 2 ? RVE_CHUNK : 1;
-  RveMove m;
-  m.dt = rve_set(call->dt), m.scale = rve_set(scale);
-  m.alpha = rve_set(call->local_damping), m.damped = call->local_damping > 0.0;
-  for (int k = 0; k < 9; k++) {
-    m.drift[k] = rve_set(head->inverse[k] * call->dt * (double)RVE_ONE);
-    m.lag[k] = rve_set(call->gradient[k] * call->dt);
-  }
   for (int first = team->pack; first < spans; first += chunk * team->packs) {
     const int left = (spans - first + team->packs - 1) / team->packs, many = left < chunk ? left : chunk;
     RveSpanForce sum[RVE_CHUNK];
     for (int q = 0; q < many; q++)
       rve_sum_reactions(ft, head, n, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
     for (int q = 0; q < many; q++)
-      rve_move(ft, &m, call->thermal, a, (first + q * team->packs) * RVE_SPAN, &sum[q], fastest, loss);
+      rve_move(ft, m, damped, thermal, a, (first + q * team->packs) * RVE_SPAN, &sum[q], fastest, loss);
   }
+}
+
+RVE_FN void rve_move_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double scale,
+                          const RveCounts *n, const RveArrays *a, rve_real *fastest, rve_real *loss) {
+  RveMove m;
+  m.dt = rve_set(call->dt), m.scale = rve_set(scale), m.alpha = rve_set(call->local_damping);
+  for (int k = 0; k < 9; k++) {
+    m.drift[k] = rve_set(head->inverse[k] * call->dt * (double)RVE_ONE);
+    m.lag[k] = rve_set(call->gradient[k] * call->dt);
+  }
+  /* Asked once, not for each span: a condition would keep the compiler from fusing products and sums across it. */
+  if (call->local_damping > 0.0) rve_move_spans(ft, &m, 1, call->thermal, team, head, n, a, fastest, loss);
+  else rve_move_spans(ft, &m, 0, call->thermal, team, head, n, a, fastest, loss);
 }
 
 #endif

@@ -6,6 +6,7 @@
 #ifndef DEMPM_RVE_NEAR_H
 #define DEMPM_RVE_NEAR_H
 
+#include "rve_rows.h"
 #include "rve_state.h"
 
 #ifndef RVE_MIXED

@@ -72,7 +72,7 @@ typedef struct RveArrays {
   double *force[3], *torque[3]; /* [N] of own slots only; 2D: torque[0] */
   double *radius, *reference_radius, *mass, *inverse_mass, *inverse_inertia; /* [N] */
   int32_t *id;         /* [N] index of the grain in its packing; -1 padding */
-  double *row;         /* [N][counts.row] what neighbours read: 2D s v | w r m; 3D s r | v m | w */
+  double *row;         /* [N][counts.row] what neighbours read, see rve_body.h */
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist) */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */

@@ -13,7 +13,8 @@ enum { TRIES = 9, MOST_KIB = 4096, ROWS = 512, PICKS = 8192 };
 int main(void) {
   static const long kib[3] = {16, 256, MOST_KIB};
   const RveKernels *kernels;
-  const BenchIsa *isa = bench_isa(&kernels);
+  const RveScene scene = rve_scene_default();
+  const BenchIsa *isa = bench_isa(&scene, &kernels);
   double *numbers = NULL, gflops = 0.0, gbs[3] = {0.0, 0.0, 0.0}, row = INFINITY;
   uint32_t *offset = NULL;
   if (BASE_ALLOC(MOST_KIB * 128, &numbers) != BASE_OK || BASE_ALLOC(PICKS, &offset) != BASE_OK) {

@@ -152,7 +152,7 @@ int main(int argc, char **argv) {
     return 2;
   }
   bench.scene = job_scene(dimension);
-  bench.isa = bench_isa(&bench.kernels);
+  bench.isa = bench_isa(&bench.scene, &bench.kernels);
   BaseStatus status = rve_packing_read(argv[1], dimension, &packing);
   packing.contacts = 0;
   if (status == BASE_OK) status = bench_parts(&bench, &packing, rounds);

@@ -3,7 +3,7 @@
 #ifndef DEMPM_BENCH_ISA_H
 #define DEMPM_BENCH_ISA_H
 
-#include "cuda_rve/rve_backend.h"
+#include "cuda_rve/rve_batch_private.h"
 
 typedef struct BenchIsa {
   const char *name;
@@ -19,21 +19,18 @@ typedef struct BenchIsa {
 
 extern const BenchIsa bench_isa_plain;
 #if defined(__x86_64__)
-extern const BenchIsa bench_isa_avx2, bench_isa_avx512;
+extern const BenchIsa bench_isa_avx2, bench_isa_avx512, bench_isa_avx512_gather;
 #endif
 
-/* The best that this machine has, as the library chooses it. */
-static inline const BenchIsa *bench_isa(const RveKernels **kernels) {
-  const BenchIsa *best = &bench_isa_plain;
-  *kernels = &rve_kernels_plain;
+/* What belongs to the kernels that the library chooses. */
+static inline const BenchIsa *bench_isa(const RveScene *scene, const RveKernels **kernels) {
+  *kernels = rve_batch_host_kernels(scene);
 #if defined(__x86_64__)
-  const int has2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  if (has2) best = &bench_isa_avx2, *kernels = &rve_kernels_avx2;
-  if (has2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
-    best = &bench_isa_avx512, *kernels = &rve_kernels_avx512;
+  if (*kernels == &rve_kernels_avx2) return &bench_isa_avx2;
+  if (*kernels == &rve_kernels_avx512) return &bench_isa_avx512;
+  if (*kernels == &rve_kernels_avx512_gather) return &bench_isa_avx512_gather;
 #endif
-  return best;
+  return &bench_isa_plain;
 }
 
 #endif
