@@ -193,7 +193,7 @@ RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0)
   return other;
 }
 
-RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RvePair *p) {
+RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
   const rve_real zero = rve_set(0.0);
   double *const *const field = a->reaction_field;
   if (ft.dimension == 2) {
@@ -206,15 +206,14 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArr
         {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero}};
     rve_scatter_placed(a->reaction, f, lane0, q);
     if (ft.tangential)
-      rve_scatter_pairs(a->reaction + rve_reaction_plane(n), field + 4, lane0, p->other_torque[1], p->other_torque[2]);
+      rve_scatter_pairs(a->reaction_more, field + 4, lane0, p->other_torque[1], p->other_torque[2]);
   }
 }
 
 /* Force on the neighbours of the slots at lane0. */
-RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3]) {
+RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real force[3]) {
   const double *const field[4] = {a->reaction_field[0], a->reaction_field[1], dim == 3 ? a->reaction_field[2] : 0, 0};
   const RveQuad q = rve_read_placed(a->reaction, field, lane0);
-  (void)n;
   for (int k = 0; k < dim; k++) force[k] = q.f[k];
 }
 
@@ -343,9 +342,8 @@ RVE_FN void near_branch(int dim, int wide, const rve_near h[18], const near_int 
   }
 }
 
-RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArrays *a, int lane0, const RvePair *p) {
+RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
   const rve_near zero = near_set(0.0);
-  (void)n;
   if (ft.dimension == 2) {
     const rve_near q[4] = {p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero};
     near_scatter_placed(a->reaction, lane0, q);
@@ -354,12 +352,11 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveCounts *n, const RveArr
   const rve_near q[4] = {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero};
   near_scatter_placed(a->reaction, lane0, q);
   if (!ft.tangential) return;
-  near_scatter_pairs(a->reaction + rve_reaction_plane(n), lane0, p->other_torque[1], p->other_torque[2]);
+  near_scatter_pairs(a->reaction_more, lane0, p->other_torque[1], p->other_torque[2]);
 }
 
-RVE_FN void rve_read_reaction(int dim, const RveCounts *n, const RveArrays *a, int lane0, rve_real force[3]) {
+RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real force[3]) {
   RveFour row[RVE_SPAN];
-  (void)n;
   for (int l = 0; l < RVE_SPAN; l++) row[l] = near_four(a->reaction + (size_t)rve_place(RVE_PACK, lane0 + l) * 2);
   const RveQuad q = rve_transpose(row);
   for (int k = 0; k < dim; k++) force[k] = q.f[k];
@@ -386,14 +383,14 @@ RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) 
 }
 
 /* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. */
-RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveCounts *n, const RveArrays *a, int lane0,
+RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0,
                               rve_real force[3], rve_real torque[3]) {
-  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK, second = ft.dimension == 3 && ft.tangential;
-  const double *const more = second ? a->reaction + rve_reaction_plane(n) : a->reaction;
+  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK;
 #if defined(__CUDACC__)
-  (void)more;
   for (int k = 0; k < 3; k++) force[k] = torque[k] = 0.0;
 #else
+  const double *const more = a->reaction_more;
+  const int second = ft.dimension == 3 && ft.tangential;
   RveFour sum[RVE_SPAN];
   RveTwo pair[RVE_SPAN];
   for (int l = 0; l < RVE_SPAN; l++) sum[l] = rve_four_zero(), pair[l] = rve_two_zero();

@@ -80,10 +80,10 @@ RVE_FN void rve_tangential_3d(RveFeatures ft, const RveContactPass *c, near_mask
                               const rve_near trial[3], rve_near size2, const rve_near vt[3], rve_near fn, rve_near gt,
                               rve_near spring[3], rve_near total[3], rve_near *slip, rve_near *loss) {
   const rve_near one = near_set(1.0), cap = rve_cap(ft, c, fn);
-  rve_near factor = near_min(one, cap * near_inverse_sqrt(size2 + near_set(NEAR_TINY)));
+  rve_near factor = near_min(cap * near_inverse_sqrt(size2), one); /* 1 also where the root of 0 gives no number */
   if (ft.bonds) factor = near_select(bonded, one, factor);
   factor = near_keep(touch, factor);
-  *slip = *slip + (one - factor) * factor * size2;
+  *slip = *slip + (factor - factor * factor) * size2;
   for (int k = 0; k < 3; k++) spring[k] = total[k] = factor * trial[k];
   if (ft.viscous) {
     const near_mask stuck = near_and_not(touch, near_less(factor, one));
@@ -142,10 +142,10 @@ RVE_FN void rve_rest(const RveHead *head, const RveArrays *a, const RveRow *row)
   a->idle_until[row->lane0 / RVE_PACK] = head->approach + (gap < cap ? gap : cap) - 1e-6 * cap;
 }
 
-RVE_FN void rve_clear(RveFeatures ft, const RveCounts *n, const RveArrays *a, const RveRow *row) {
+RVE_FN void rve_clear(RveFeatures ft, const RveArrays *a, const RveRow *row) {
   RvePair none;
   for (int k = 0; k < 3; k++) none.push[k] = none.torque[k] = none.other_torque[k] = near_set(0.0);
-  near_write_reaction(ft, n, a, row->lane0, &none);
+  near_write_reaction(ft, a, row->lane0, &none);
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, near_set(0.0));
 }
 
@@ -175,7 +175,7 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
     old[k] = near_load(a->shear[k], row->lane0);
   }
   if (dim == 2) {
-    row->slide[0] = n[0] * u[1] - n[1] * u[0] - w[0];
+    row->slide[0] = n[0] * u[1] - (n[1] * u[0] + w[0]);
     row->trial[0] = old[0] + c->kt_dt * row->slide[0];
     return;
   }
@@ -183,8 +183,11 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
     trial[k] = old[k];
     if (c->turning) trial[k] = c->turn[3 * k] * old[0] + c->turn[3 * k + 1] * old[1] + c->turn[3 * k + 2] * old[2];
   }
-  const rve_near cross[3] = {w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2], w[0] * n[1] - w[1] * n[0]};
-  for (int k = 0; k < 3; k++) u[k] = u[k] - cross[k], trial[k] = trial[k] + c->kt_dt * u[k];
+  for (int k = 0; k < 3; k++) {
+    const int l = (k + 1) % 3, m = (k + 2) % 3; /* u - w x n */
+    u[k] = u[k] - w[l] * n[m] + w[m] * n[l];
+    trial[k] = trial[k] + c->kt_dt * u[k];
+  }
   const rve_near along = near_dot(3, trial, n);
   for (int k = 0; k < 3; k++) row->trial[k] = trial[k] - along * n[k];
   for (int k = 0; ft.viscous && k < 3; k++) row->slide[k] = u[k] - row->opening * n[k];
@@ -255,18 +258,18 @@ typedef struct RveContactSums {
   rve_near force[3], torque[3]; /* of one block's own slots */
 } RveContactSums;
 
-RVE_FN void rve_add_contact(RveFeatures ft, const RveContactPass *c, const RveCounts *n, const RveArrays *a,
+RVE_FN void rve_add_contact(RveFeatures ft, const RveContactPass *c, const RveArrays *a,
                             const RveNearBody *own, const RveRow *row, RveContactSums *sum) {
   const RvePair p = rve_contact(ft, c, a, own, row, &sum->slid, &sum->lost);
-  near_write_reaction(ft, n, a, row->lane0, &p);
+  near_write_reaction(ft, a, row->lane0, &p);
   for (int k = 0; k < ft.dimension; k++) sum->force[k] = sum->force[k] - p.push[k];
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) sum->torque[k] = sum->torque[k] + p.torque[k];
 }
 
 /* The rows of one block, each part of the computation for up to RVE_CHUNK of them in turn. The block's own grains are
  * read again where they are needed: as operands from memory they take no registers. */
-RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveCounts *n,
-                               const RveArrays *a, int block, RveContactSums *sum) {
+RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveArrays *a, int block,
+                               RveContactSums *sum) {
   for (int at = a->slot_first[block]; at < a->slot_first[block + 1];) {
     RveRow row[RVE_CHUNK];
     int rows = 0;
@@ -276,7 +279,7 @@ RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const Rv
       RveNearBody other;
       near_neighbour_place(ft, a, at * RVE_PACK, &other);
       if (rve_meet(ft, c, a, &own, &other, at * RVE_PACK, &row[rows])) rows++;
-      else rve_clear(ft, n, a, &row[rows]), rve_rest(head, a, &row[rows]);
+      else rve_clear(ft, a, &row[rows]), rve_rest(head, a, &row[rows]);
     }
     if (ft.tangential || ft.viscous)
       for (int r = 0; r < rows; r++) {
@@ -285,7 +288,7 @@ RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const Rv
       }
     for (int r = 0; r < rows; r++) {
       const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
-      rve_add_contact(ft, c, n, a, &own, &row[r], sum);
+      rve_add_contact(ft, c, a, &own, &row[r], sum);
     }
   }
 }
@@ -313,9 +316,8 @@ RVE_FN RveNearBody rve_take_row(RveFeatures ft, const RveHead *head, const RveAr
 }
 
 /* The same where a row's numbers fit the registers: 2D, and a thread of CUDA. */
-RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveCounts *n,
-                             const RveArrays *a, int block, const RveNearBody *own, RveRows *rows,
-                             RveContactSums *sum) {
+RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveArrays *a, int block,
+                             const RveNearBody *own, RveRows *rows, RveContactSums *sum) {
   const int stop = a->slot_first[block + 1];
   if (!RVE_AHEAD) rows->end = stop, rve_find_row(ft, head, a, a->slot_first[block], rows);
   while (rows->row < stop) {
@@ -324,7 +326,7 @@ RVE_FN void rve_contact_rows(RveFeatures ft, const RveContactPass *c, const RveH
     const RveNearBody other = rve_take_row(ft, head, a, rows);
     const int touching = rve_meet(ft, c, a, own, &other, at * RVE_PACK, &row);
     if (ft.tangential || ft.viscous) rve_slide(ft, c, a, own, &row);
-    rve_add_contact(ft, c, n, a, own, &row, sum);
+    rve_add_contact(ft, c, a, own, &row, sum);
     if (!touching) rve_rest(head, a, &row); /* asked last: the compiler may not mix what stands before and behind */
   }
 }
@@ -366,8 +368,8 @@ RVE_FN void rve_contact_blocks(RveFeatures ft, const RveTeam *team, const RveCal
     const RveNearBody own = near_own_body(ft, a, lane0);
     rve_fetch_ahead(s);
     for (int k = 0; k < 3; k++) sum.force[k] = sum.torque[k] = near_set(0.0);
-    if (chunks) rve_contact_chunks(ft, &c, head, n, a, block, &sum);
-    else rve_contact_rows(ft, &c, head, n, a, block, &own, &rows, &sum);
+    if (chunks) rve_contact_chunks(ft, &c, head, a, block, &sum);
+    else rve_contact_rows(ft, &c, head, a, block, &own, &rows, &sum);
     for (int k = 0; k < ft.dimension; k++) near_store(a->force[k], lane0, sum.force[k]);
     for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->torque[k], lane0, sum.torque[k]);
   }
@@ -454,7 +456,7 @@ RVE_FN void rve_move_spans(RveFeatures ft, const RveMove *m, int damped, int the
     const int left = (spans - first + team->packs - 1) / team->packs, many = left < chunk ? left : chunk;
     RveSpanForce sum[RVE_CHUNK];
     for (int q = 0; q < many; q++)
-      rve_sum_reactions(ft, head, n, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
+      rve_sum_reactions(ft, head, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
     for (int q = 0; q < many; q++)
       rve_move(ft, m, damped, thermal, a, (first + q * team->packs) * RVE_SPAN, &sum[q], fastest, loss);
   }

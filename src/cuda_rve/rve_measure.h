@@ -54,8 +54,8 @@ RVE_FN void rve_add_fourth(int dim, rve_real sum[15], const rve_real n[3], rve_r
 }
 
 /* One row of slots. The force is that of the last contact pass, read back from the reactions. */
-RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real h[9], const RveCounts *counts,
-                            const RveArrays *a, const RveBody *own, int lane0, RveSums *sum) {
+RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real h[9], const RveArrays *a,
+                            const RveBody *own, int lane0, RveSums *sum) {
   const int dim = ft.dimension;
   const RveBody other = rve_neighbour_body(ft, a, lane0);
   const rve_int image = rve_load_short(a->image, lane0);
@@ -66,7 +66,7 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real 
   const rve_mask bonded = rve_int_any_bit(image, rve_set_int(RVE_IMAGE_BOND));
   const rve_mask touch = rve_or(rve_less(zero, overlap), bonded);
   for (int k = 0; k < dim; k++) n[k] = rve_keep(touch, d[k] / length), d[k] = rve_keep(touch, d[k]);
-  rve_read_reaction(dim, counts, a, lane0, f);
+  rve_read_reaction(dim, a, lane0, f);
   for (int k = 0; k < dim; k++) f[k] = zero - f[k];
   rve_add_dyad(dim, sum->of.stress, f, d);
   sum->of.force = sum->of.force + rve_sqrt(rve_dot(dim, f, f));
@@ -89,14 +89,14 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real 
 }
 
 /* flew: there are no forces. */
-RVE_FN void rve_sum_grains(RveFeatures ft, const RveHead *head, const RveCounts *n, const RveArrays *a, int lane0,
-                           const RveBody *own, int flew, RveSums *sum) {
+RVE_FN void rve_sum_grains(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0, const RveBody *own,
+                           int flew, RveSums *sum) {
   const int dim = ft.dimension;
   rve_real f[3], t[3], p[3];
   const rve_real m = rve_load(a->mass, lane0), im = rve_load(a->inverse_inertia, lane0), half = rve_set(0.5);
   for (int k = 0; k < dim; k++) p[k] = rve_set(0.0) - m * own->v[k];
   if (!flew) {
-    rve_sum_reactions(ft, head, n, a, lane0, f, t);
+    rve_sum_reactions(ft, head, a, lane0, f, t);
     for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0);
     sum->of.resultant = sum->of.resultant + rve_sqrt(rve_dot(dim, f, f));
   }
@@ -202,8 +202,8 @@ RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call
     const int block = span / RVE_PARTS, part = span % RVE_PARTS * RVE_SPAN;
     const RveBody own = rve_own_body(all, a, span * RVE_SPAN);
     for (int row = a->slot_first[block]; row < a->slot_first[block + 1] && !flew; row++)
-      rve_sum_contact(ft, call, h, n, a, &own, row * RVE_PACK + part, &sum);
-    rve_sum_grains(ft, head, n, a, span * RVE_SPAN, &own, flew, &sum);
+      rve_sum_contact(ft, call, h, a, &own, row * RVE_PACK + part, &sum);
+    rve_sum_grains(ft, head, a, span * RVE_SPAN, &own, flew, &sum);
   }
   RveTotals total;
   for (int k = 0; k < RVE_SUMS; k++) total.all[k] = rve_team_sum(team, sum.all[k]);

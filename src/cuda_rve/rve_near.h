@@ -14,7 +14,6 @@
 typedef rve_real rve_near;
 typedef rve_int near_image;
 typedef rve_mask near_mask;
-#define NEAR_TINY 1e-300
 #define near_set rve_set
 #define near_load rve_load
 #define near_store rve_store
@@ -47,7 +46,6 @@ typedef struct near_int {
 } near_int;
 typedef __m256i near_image; /* 16 uint16 */
 typedef __mmask16 near_mask;
-#define NEAR_TINY 1e-36
 
 RVE_FN rve_near near_set(double a) { return _mm512_set1_ps((float)a); }
 RVE_FN rve_near near_join(__m256 low, __m256 high) {

@@ -78,6 +78,7 @@ typedef struct RveArrays {
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
   double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_place() of the slot: a plane of four
                           numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z); the last slots stay zero */
+  double *reaction_more;                /* its second plane */
   double *reaction_field[6];            /* the same as arrays, if counts.reaction = 0 */
   uint32_t *incoming;                   /* [incoming] slot (its place in doubles, if counts.reaction > 0) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
@@ -139,6 +140,9 @@ RVE_ANY void *rve_carve(void *base, size_t *used, size_t bytes) {
   return at;
 }
 
+/* Doubles of a slot in the first plane of reactions; half as many in the second. */
+RVE_ANY int rve_reaction_width(const RveCounts *n) { return n->dimension == 2 ? n->reaction : n->reaction / 3 * 2; }
+
 /* Lays the arrays behind the head at `base` (NULL: only counts); returns the arena's bytes. */
 RVE_ANY size_t rve_layout(const RveCounts *n, void *base, RveArrays *a) {
   const size_t grains = (size_t)n->blocks * (size_t)n->lanes, spins = n->dimension == 2 ? 1 : 3;
@@ -161,6 +165,7 @@ RVE_ANY size_t rve_layout(const RveCounts *n, void *base, RveArrays *a) {
   a->neighbour = (uint32_t *)rve_carve(base, &used, slots * 4);
   a->image = (uint16_t *)rve_carve(base, &used, slots * 2);
   a->reaction = (double *)rve_carve(base, &used, (slots + pad) * (size_t)n->reaction * 8);
+  a->reaction_more = a->reaction ? a->reaction + (slots + pad) * (size_t)rve_reaction_width(n) : (double *)0;
   for (int k = 0; k < 6; k++) {
     const int present = n->reaction == 0 && k < (n->dimension == 2 ? 3 : 6);
     a->reaction_field[k] = (double *)rve_carve(base, &used, present ? (slots + pad) * 8 : 0);
@@ -203,12 +208,6 @@ RVE_ANY int rve_image_fits(const int p[3]) {
   for (int k = 0; k < 3; k++)
     if (p[k] < -RVE_IMAGE_MAX || p[k] > RVE_IMAGE_MAX) return 0;
   return 1;
-}
-/* Doubles of a slot in the first plane of reactions; half as many in the second. */
-RVE_ANY int rve_reaction_width(const RveCounts *n) { return n->dimension == 2 ? n->reaction : n->reaction / 3 * 2; }
-/* Doubles from the first plane of reactions to the second. */
-RVE_ANY size_t rve_reaction_plane(const RveCounts *n) {
-  return ((size_t)n->slot_rows + 1) * (size_t)n->lanes * (size_t)rve_reaction_width(n);
 }
 RVE_ANY RveHead *rve_head(void *arena) { return (RveHead *)arena; }
 

@@ -261,8 +261,12 @@ enum { RVE_CHUNK = 1, RVE_AHEAD = 0 };
 #else
 enum { RVE_CHUNK = 4, RVE_AHEAD = 1 /* see RveRows */ };
 #endif
-/* 1 where lists of wide cells (RveHead.wide) are worth a form of the contact pass of their own: in 3D it gains nothing. */
+/* 1 where lists of wide cells (RveHead.wide) are worth a form of the contact pass of their own: not in 3D on a Zen 4. */
+#if defined(RVE_GATHERS)
+RVE_FN int rve_may_be_wide(int dimension) { return dimension >= 2; }
+#else
 RVE_FN int rve_may_be_wide(int dimension) { return RVE_ROWS && dimension == 2; }
+#endif
 
 /* 1/sqrt(a) to round-off. */
 #if defined(RVE_ISA_AVX512)
