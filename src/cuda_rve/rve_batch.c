@@ -14,7 +14,7 @@
 /* -------------------------------------------------------------------------------------------------- which kernels */
 
 #if defined(__x86_64__)
-/* Intel's processors from Sapphire Rapids on, the first with AVX512-FP16; on their predecessors and on a Zen 4 gathers are slow. */
+/* Intel's processors from Sapphire Rapids on, the first with AVX512-FP16. One of them was measured; on others rows are the known good. */
 static int gathers_are_fast(void) {
   unsigned a, b, c, d;
   return __builtin_cpu_is("intel") && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (d >> 23 & 1);

@@ -2,8 +2,8 @@
 /* Rows of four fields of a grain or a slot (array of structures), transposed into lanes and back; CUDA reads and writes
  * arrays instead.
  *
- * Loading rows and transposing them is faster than gathers where four fields are wanted. On Intel's processors from Sapphire
- * Rapids on single fields are gathered as fast (RVE_GATHERS): rows then hold multiples of four fields, and less is written. */
+ * Loading rows and transposing them is faster than gathers where four fields are wanted. On an Intel processor with
+ * AVX512-FP16 single fields are gathered as fast (RVE_GATHERS): rows then hold multiples of four fields, and less is written. */
 #ifndef DEMPM_RVE_ROWS_H
 #define DEMPM_RVE_ROWS_H
 

@@ -32,8 +32,8 @@ create_atoms 1 region column
 
 @pytest.fixture(scope="module")
 def grains(tmp_path_factory):
-    """Kept: how far two collapses drift apart depends on the draw, in three of five by more than the bounds below, with kernels of
-    different last bits alike. Made by dempm-pack generate FILE radius 0.0025 0.005 pressure 1e4 preparation_friction 0.5 density 2650
+    """Kept: how far two collapses drift apart depends on the draw, in three or four of five (kernels of different last bits) by more than
+    the bounds below. Made by dempm-pack generate FILE radius 0.0025 0.005 pressure 1e4 preparation_friction 0.5 density 2650
     kn 1e6 kt 1e6 thickness 0.075 grains 64, which draws another one today."""
     path = tmp_path_factory.mktemp("rest") / "grains.packing"
     shutil.copy(ROOT / "tests" / "data" / "rest.packing", path)

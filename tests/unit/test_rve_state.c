@@ -166,10 +166,11 @@ static void bond(const RveScene *scene, RveBatch *batch) {
 
 /* Largest differences between one instruction set and plain code: after a short run, after states moved from that to this. */
 static void compare_sets(const char *isa, const RveScene *scene, const RvePacking *packing, double *worst, double *handed) {
-  int there;
+  int plain_there, there;
   double gradient[9] = {0.0};
   gradient[1] = 1.0, gradient[0] = -0.5;
-  RveBatch *plain = batch_on("plain", scene, packing, &there), *batch = batch_on(isa, scene, packing, &there);
+  RveBatch *plain = batch_on("plain", scene, packing, &plain_there), *batch = batch_on(isa, scene, packing, &there);
+  assert_true(plain_there);
   bond(scene, plain), bond(scene, batch);
   const RveAnswer expected = help_step(plain, gradient, 0.1, 5e-4);
   size_t size;
