@@ -54,7 +54,7 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
 #if defined(RVE_MIXED)
 #define ROWS {4, 8}, {2, 3} /* rve_row_doubles() */
 #elif defined(RVE_GATHERS)
-#define ROWS {4, 8}, {4, 6}
+#define ROWS {0, 8}, {4, RVE_WHOLE}
 #else
 #define ROWS {8, 12}, {4, 6}
 #endif

@@ -73,50 +73,67 @@ typedef RveBody RveNearBody;
 #define near_dot rve_dot
 
 #if defined(RVE_GATHERS)
-/* Rows are 2D s v, 3D s v_x | v_y v_z w_x w_y; what else is wanted comes from the arrays. */
+/* Rows, in 3D only, are s v_x | v_y v_z w_x w_y; what else is wanted comes from the arrays. */
 
 /* Places and radii of neighbours (2D: and all else); then the rest. */
 RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   const double *const none[4] = {0, 0, 0, 0};
-  const RveQuad q = rve_gather(a->row, none, a->neighbour, lane0);
-  const int dim = ft.dimension, stride = rve_row_doubles(dim);
-  for (int k = 0; k < dim; k++) other->s[k] = rve_int_from_bits(q.f[k]);
-  for (int k = dim; k < 4; k++) other->v[k - dim] = q.f[k];
-  other->r = rve_pick(a->radius, a->neighbour, lane0, stride);
-  if (dim == 3) return;
-  if (ft.tangential) other->w[0] = rve_pick(a->spin[0], a->neighbour, lane0, stride);
-  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, stride);
+  const int row = rve_row_doubles(ft.dimension);
+  if (ft.dimension == 3) {
+    const RveQuad q = rve_gather(a->row, none, a->neighbour, lane0);
+    for (int k = 0; k < 3; k++) other->s[k] = rve_int_from_bits(q.f[k]);
+    other->v[0] = q.f[3];
+    other->r = rve_pick(a->radius, a->neighbour, lane0, row);
+    return;
+  }
+  for (int k = 0; k < 2; k++)
+    other->s[k] = rve_int_from_bits(rve_pick((const double *)a->position[k], a->neighbour, lane0, row));
+  other->r = rve_pick(a->radius, a->neighbour, lane0, row);
+  for (int k = 0; k < 2; k++) other->v[k] = rve_pick(a->velocity[k], a->neighbour, lane0, row);
+  if (ft.tangential) other->w[0] = rve_pick(a->spin[0], a->neighbour, lane0, row);
+  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, row);
 }
 
 RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   if (ft.dimension == 2) return;
   const double *const none[4] = {0, 0, 0, 0};
   const RveQuad q = rve_gather(a->row + 4, none, a->neighbour, lane0);
-  const int stride = rve_row_doubles(3);
+  const int row = rve_row_doubles(3);
   for (int k = 0; k < 2; k++) other->v[k + 1] = q.f[k], other->w[k] = q.f[k + 2];
-  if (ft.tangential) other->w[2] = rve_pick(a->spin[2], a->neighbour, lane0, stride);
-  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, stride);
+  if (ft.tangential) other->w[2] = rve_pick(a->spin[2], a->neighbour, lane0, row);
+  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, row);
 }
 
 /* Of what near_neighbour_place has read, what is still needed once the branch is known. */
 RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
   kept->r = other->r;
-  for (int k = ft.dimension; k < 4; k++) kept->v[k - ft.dimension] = other->v[k - ft.dimension];
+  kept->v[0] = other->v[0];
   if (ft.dimension == 3) return;
+  kept->v[1] = other->v[1];
   if (ft.tangential) kept->w[0] = other->w[0];
   if (ft.viscous) kept->m = other->m;
 }
 
 RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
-  double *const none[4] = {0, 0, 0, 0};
-  const int stride = rve_row_doubles(dimension);
-  RveQuad q;
-  for (int k = 0; k < dimension; k++) q.f[k] = rve_bits_from_int(b->s[k]);
-  for (int k = dimension; k < 4; k++) q.f[k] = b->v[k - dimension];
-  rve_scatter(a->row, stride, none, lane0, q);
   if (dimension == 2) return;
+  double *const none[4] = {0, 0, 0, 0};
+  const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), rve_bits_from_int(b->s[2]), b->v[0]}};
   const RveQuad p = {{b->v[1], b->v[2], b->w[0], b->w[1]}};
-  rve_scatter(a->row + 4, stride, none, lane0, p);
+  rve_scatter(a->row, rve_row_doubles(3), none, lane0, q);
+  rve_scatter(a->row + 4, rve_row_doubles(3), none, lane0, p);
+}
+
+/* 3D reactions are whole, so that one addition takes all of one: f t_x | t_y t_z, and two numbers that nobody reads. */
+RVE_FN void rve_write_reaction_3d(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
+  double *const none[4] = {0, 0, 0, 0};
+  const RveQuad q = {{p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : rve_set(0.0)}};
+  rve_scatter(a->reaction, RVE_WHOLE, none, lane0, q);
+  if (ft.tangential) rve_scatter_two(a->reaction + 4, RVE_WHOLE, lane0, p->other_torque[1], p->other_torque[2]);
+}
+RVE_FN RveQuad rve_read_reaction_3d(const RveArrays *a, int lane0) {
+  RveFour row[RVE_SPAN];
+  for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four(a->reaction + (size_t)(lane0 + l) * RVE_WHOLE);
+  return rve_transpose(row);
 }
 
 #else
@@ -184,6 +201,18 @@ RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const R
   }
 }
 
+RVE_FN void rve_write_reaction_3d(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
+  double *const *const field = a->reaction_field;
+  double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
+  const RveQuad q = {{p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : rve_set(0.0)}};
+  rve_scatter_placed(a->reaction, f, lane0, q);
+  if (ft.tangential) rve_scatter_pairs(a->reaction_more, field + 4, lane0, p->other_torque[1], p->other_torque[2]);
+}
+RVE_FN RveQuad rve_read_reaction_3d(const RveArrays *a, int lane0) {
+  const double *const field[4] = {a->reaction_field[0], a->reaction_field[1], a->reaction_field[2], 0};
+  return rve_read_placed(a->reaction, field, lane0);
+}
+
 #endif
 
 RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
@@ -194,26 +223,20 @@ RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0)
 }
 
 RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
-  const rve_real zero = rve_set(0.0);
-  double *const *const field = a->reaction_field;
-  if (ft.dimension == 2) {
-    double *const f[4] = {field[0], field[1], ft.tangential ? field[2] : 0, 0};
-    const RveQuad q = {{p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero}};
-    rve_scatter_placed(a->reaction, f, lane0, q);
-  } else {
-    double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
-    const RveQuad q = {
-        {p->push[0], p->push[1], p->push[2], ft.tangential ? p->other_torque[0] : zero}};
-    rve_scatter_placed(a->reaction, f, lane0, q);
-    if (ft.tangential)
-      rve_scatter_pairs(a->reaction_more, field + 4, lane0, p->other_torque[1], p->other_torque[2]);
+  if (ft.dimension == 3) {
+    rve_write_reaction_3d(ft, a, lane0, p);
+    return;
   }
+  const rve_real zero = rve_set(0.0);
+  double *const f[4] = {a->reaction_field[0], a->reaction_field[1], ft.tangential ? a->reaction_field[2] : 0, 0};
+  const RveQuad q = {{p->push[0], p->push[1], ft.tangential ? p->other_torque[0] : zero, zero}};
+  rve_scatter_placed(a->reaction, f, lane0, q);
 }
 
 /* Force on the neighbours of the slots at lane0. */
 RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real force[3]) {
-  const double *const field[4] = {a->reaction_field[0], a->reaction_field[1], dim == 3 ? a->reaction_field[2] : 0, 0};
-  const RveQuad q = rve_read_placed(a->reaction, field, lane0);
+  const double *const field[4] = {a->reaction_field[0], a->reaction_field[1], 0, 0};
+  const RveQuad q = dim == 3 ? rve_read_reaction_3d(a, lane0) : rve_read_placed(a->reaction, field, lane0);
   for (int k = 0; k < dim; k++) force[k] = q.f[k];
 }
 
@@ -382,6 +405,21 @@ RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) 
   return head->approach < until;
 }
 
+#if defined(RVE_GATHERS)
+/* rve_sum_reactions() of whole reactions. */
+RVE_FN void rve_sum_whole(const RveHead *head, const RveArrays *a, int block, rve_real force[3], rve_real torque[3]) {
+  rve_real sum[8], field[6];
+  for (int l = 0; l < 8; l++) sum[l] = rve_set(0.0);
+  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
+    if (row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
+    const uint32_t *at = a->incoming + row * RVE_PACK;
+    for (int l = 0; l < 8; l++) sum[l] = sum[l] + rve_load(a->reaction + at[l], 0);
+  }
+  rve_transpose_six(sum, field);
+  for (int k = 0; k < 3; k++) force[k] = field[k], torque[k] = field[3 + k];
+}
+#endif
+
 /* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. */
 RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0,
                               rve_real force[3], rve_real torque[3]) {
@@ -391,6 +429,12 @@ RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArra
 #else
   const double *const more = a->reaction_more;
   const int second = ft.dimension == 3 && ft.tangential;
+#if defined(RVE_GATHERS)
+  if (second) {
+    rve_sum_whole(head, a, block, force, torque);
+    return;
+  }
+#endif
   RveFour sum[RVE_SPAN];
   RveTwo pair[RVE_SPAN];
   for (int l = 0; l < RVE_SPAN; l++) sum[l] = rve_four_zero(), pair[l] = rve_two_zero();

@@ -16,7 +16,7 @@ typedef struct RveContactPass {
   rve_near h[9 * RVE_PARTS]; /* H times rve_fraction_unit(); in FP32 also what its rounding left */
   rve_near rate[9]; /* D */
   rve_near turn[9];
-  rve_near kn, kt_dt, kt, mu, dt, gn, gt, gc, bond, bond_ratio;
+  rve_near kn, kt_dt, kt, mu, mu_kn, dt, gn, gt, gc, bond, bond_ratio;
   int turning;
 } RveContactPass;
 
@@ -43,6 +43,7 @@ RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, c
   c.kt = near_set(call->tangential_stiffness);
   c.kt_dt = near_set(call->tangential_stiffness * dt);
   c.mu = near_set(call->friction);
+  c.mu_kn = near_set(call->friction * call->normal_stiffness);
   c.dt = near_set(dt);
   c.gn = near_set(call->normal_viscosity);
   c.gt = near_set(call->tangential_viscosity);
@@ -52,18 +53,20 @@ RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, c
   return c;
 }
 
-/* Coulomb's cap, mu |fn|. Springs alone only push. */
-RVE_FN rve_near rve_cap(RveFeatures ft, const RveContactPass *c, rve_near fn) {
-  return c->mu * (ft.viscous || ft.bonds ? near_abs(fn) : fn);
+/* Coulomb's cap, mu |fn|. Springs alone only push: straight from the overlap, so that nobody waits for fn to be masked (any
+ * number where nothing touches). */
+RVE_FN rve_near rve_cap(RveFeatures ft, const RveContactPass *c, rve_near fn, rve_near overlap) {
+  if (ft.viscous || ft.bonds) return c->mu * near_abs(fn);
+  return c->mu_kn * overlap;
 }
 
 /* Tangential part: history, Coulomb's cap (or the bond), dashpot. stick: lanes that an intact bond exempts from the
  * cap. Follows LIGGGHTS' `tangential history`: the dashpot acts on contacts that do not slide and is outside the cap.
  */
-RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, near_mask touch, near_mask bonded, rve_near trial,
-                              rve_near vt, rve_near fn, rve_near gt, rve_near *spring, rve_near *total, rve_near *slip,
+RVE_FN void rve_tangential_2d(RveFeatures ft, near_mask touch, near_mask bonded, rve_near trial,
+                              rve_near vt, rve_near cap, rve_near gt, rve_near *spring, rve_near *total, rve_near *slip,
                               rve_near *loss) {
-  rve_near f = near_limit(trial, rve_cap(ft, c, fn));
+  rve_near f = near_limit(trial, cap);
   if (ft.bonds) f = near_select(bonded, trial, f);
   f = near_keep(touch, f);
   *slip = *slip + (trial - f) * f; /* times 1/kt: |f| times the slip distance; same sign, so no modulus */
@@ -76,10 +79,10 @@ RVE_FN void rve_tangential_2d(RveFeatures ft, const RveContactPass *c, near_mask
   }
 }
 
-RVE_FN void rve_tangential_3d(RveFeatures ft, const RveContactPass *c, near_mask touch, near_mask bonded,
-                              const rve_near trial[3], rve_near size2, const rve_near vt[3], rve_near fn, rve_near gt,
+RVE_FN void rve_tangential_3d(RveFeatures ft, near_mask touch, near_mask bonded, const rve_near trial[3],
+                              rve_near size2, const rve_near vt[3], rve_near cap, rve_near gt,
                               rve_near spring[3], rve_near total[3], rve_near *slip, rve_near *loss) {
-  const rve_near one = near_set(1.0), cap = rve_cap(ft, c, fn);
+  const rve_near one = near_set(1.0);
   rve_near factor = near_min(cap * near_inverse_sqrt(size2), one); /* 1 also where the root of 0 gives no number */
   if (ft.bonds) factor = near_select(bonded, one, factor);
   factor = near_keep(touch, factor);
@@ -111,7 +114,7 @@ typedef struct RveRow {
   near_image image;
   near_mask touch, bonded; /* touch: or bonded; with bonds only */
   RveNearBody other;
-  rve_near d[2], n[3], overlap, opening, slide[3], trial[3]; /* d, the branch: 2D */
+  rve_near d[2], inverse, n[3], overlap, opening, slide[3], trial[3]; /* d, the branch, and 1/|d|: 2D */
 } RveRow;
 
 /* First part: where the neighbours are, and whether any touches. */
@@ -132,6 +135,7 @@ RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a,
   near_keep_place(ft, other, &row->other);
   for (int k = 0; k < ft.dimension; k++) row->n[k] = d[k] * inverse;
   for (int k = 0; ft.dimension == 2 && k < 2; k++) row->d[k] = d[k];
+  if (ft.dimension == 2) row->inverse = inverse;
   row->overlap = overlap;
   return near_any(touch);
 }
@@ -147,6 +151,15 @@ RVE_FN void rve_clear(RveFeatures ft, const RveArrays *a, const RveRow *row) {
   for (int k = 0; k < 3; k++) none.push[k] = none.torque[k] = none.other_torque[k] = near_set(0.0);
   near_write_reaction(ft, a, row->lane0, &none);
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->shear[k], row->lane0, near_set(0.0));
+}
+
+/* n x u - (lever w_i + other_lever w_j), but with 1/|d| and the overlap, which come late, in the last two operations: the levers
+ * are R - overlap / 2. */
+RVE_FN rve_near rve_slide_2d(const RveNearBody *own, const RveNearBody *other, const RveRow *row, const rve_near u[2]) {
+  const rve_near half = near_set(0.5), across = row->d[0] * u[1] - row->d[1] * u[0];
+  const rve_near rims = own->r * own->w[0] + row->other.r * other->w[0];
+  const rve_near mean = near_fma(half, other->w[0], half * own->w[0]);
+  return near_fma(row->overlap, mean, near_fms(across, row->inverse, rims));
 }
 
 /* Second part: relative motion, and the tangential force if nothing slid: history turned with the flow, plus the step's
@@ -170,15 +183,13 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
   }
   if (ft.viscous) row->opening = near_dot(dim, u, n);
   if (!ft.tangential) return;
-  for (int k = 0; k < rve_spins(ft); k++) {
-    w[k] = lever * own->w[k] + other_lever * other.w[k];
-    old[k] = near_load(a->shear[k], row->lane0);
-  }
+  for (int k = 0; k < rve_spins(ft); k++) old[k] = near_load(a->shear[k], row->lane0);
   if (dim == 2) {
-    row->slide[0] = n[0] * u[1] - (n[1] * u[0] + w[0]);
+    row->slide[0] = rve_slide_2d(own, &other, row, u);
     row->trial[0] = old[0] + c->kt_dt * row->slide[0];
     return;
   }
+  for (int k = 0; k < 3; k++) w[k] = lever * own->w[k] + other_lever * other.w[k];
   for (int k = 0; k < 3; k++) {
     trial[k] = old[k];
     if (c->turning) trial[k] = c->turn[3 * k] * old[0] + c->turn[3 * k + 1] * old[1] + c->turn[3 * k + 2] * old[2];
@@ -216,7 +227,7 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
     *loss = *loss + near_keep(touch, gn * opening * opening);
     gt = c->gt * effective;
   }
-  const int springs = !ft.viscous && !ft.bonds; /* push only where grains touch; so the cap is 0 elsewhere, too */
+  const int springs = !ft.viscous && !ft.bonds; /* push only where grains touch */
   if (springs) fn = near_keep(touch, fn);
   RvePair p;
   if (ft.tangential && dim == 2) trial2 = row->trial[0] * row->trial[0];
@@ -227,13 +238,14 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
   }
   if (ft.tangential) {
     const rve_near lever = own->r - half * overlap, other_lever = row->other.r - half * overlap;
+    const rve_near cap = rve_cap(ft, c, fn, overlap);
     rve_near spring[3];
     if (dim == 2) {
-      rve_tangential_2d(ft, c, touch, bonded, row->trial[0], row->slide[0], fn, gt, spring, total, slip, loss);
+      rve_tangential_2d(ft, touch, bonded, row->trial[0], row->slide[0], cap, gt, spring, total, slip, loss);
       p.torque[0] = lever * total[0];
       p.other_torque[0] = other_lever * total[0];
     } else {
-      rve_tangential_3d(ft, c, touch, bonded, row->trial, trial2, row->slide, fn, gt, spring, total, slip, loss);
+      rve_tangential_3d(ft, touch, bonded, row->trial, trial2, row->slide, cap, gt, spring, total, slip, loss);
       const rve_near cross[3] = {n[1] * total[2] - n[2] * total[1], n[2] * total[0] - n[0] * total[2],
                                  n[0] * total[1] - n[1] * total[0]};
       for (int k = 0; k < 3; k++) p.torque[k] = lever * cross[k], p.other_torque[k] = other_lever * cross[k];
@@ -244,8 +256,8 @@ RVE_FN RvePair rve_contact(RveFeatures ft, const RveContactPass *c, const RveArr
   for (int k = 0; k < dim; k++) p.push[k] = fn * n[k];
   if (ft.tangential) {
     if (dim == 2) {
-      p.push[0] = p.push[0] + total[0] * n[1];
-      p.push[1] = p.push[1] - total[0] * n[0];
+      p.push[0] = near_fma(total[0], n[1], p.push[0]); /* the tangential part last: it is the later one */
+      p.push[1] = near_fnma(total[0], n[0], p.push[1]);
     } else
       for (int k = 0; k < 3; k++) p.push[k] = p.push[k] - total[k];
   }
@@ -448,13 +460,13 @@ RVE_FN void rve_move(RveFeatures ft, const RveMove *m, int damped, int thermal, 
   rve_write_rows(dim, a, lane0, &b);
 }
 
-/* Sums forces, kicks, drifts; as with contacts, the first part runs ahead for several spans. */
+/* Sums forces, kicks, drifts; as with contacts, the first part may run ahead for several spans. */
 RVE_FN void rve_move_spans(RveFeatures ft, const RveMove *m, int damped, int thermal, const RveTeam *team, const RveHead *head,
                            const RveCounts *n, const RveArrays *a, rve_real *fastest, rve_real *loss) {
-  const int spans = n->blocks * RVE_PARTS, chunk = ft.dimension == 2 ? RVE_CHUNK : 1;
+  const int spans = n->blocks * RVE_PARTS, chunk = ft.dimension == 2 ? RVE_SUM_AHEAD : 1;
   for (int first = team->pack; first < spans; first += chunk * team->packs) {
     const int left = (spans - first + team->packs - 1) / team->packs, many = left < chunk ? left : chunk;
-    RveSpanForce sum[RVE_CHUNK];
+    RveSpanForce sum[RVE_SUM_AHEAD];
     for (int q = 0; q < many; q++)
       rve_sum_reactions(ft, head, a, (first + q * team->packs) * RVE_SPAN, sum[q].force, sum[q].torque);
     for (int q = 0; q < many; q++)

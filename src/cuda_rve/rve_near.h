@@ -22,6 +22,9 @@ typedef rve_mask near_mask;
 #define near_image_any(image, bits) rve_int_any_bit(image, rve_set_int(bits))
 #define near_image_clear(mask, image, bits) rve_int_clear(mask, image, rve_set_int(bits))
 #define near_sqrt rve_sqrt
+#define near_fma rve_fma
+#define near_fms rve_fms
+#define near_fnma rve_fnma
 #define near_inverse_sqrt rve_inverse_sqrt
 #define near_min rve_min
 #define near_abs rve_abs
@@ -78,6 +81,9 @@ RVE_FN near_image near_image_clear(near_mask m, near_image a, int bits) {
   return _mm256_mask_mov_epi16(a, m, _mm256_andnot_si256(_mm256_set1_epi16((short)bits), a));
 }
 RVE_FN rve_near near_sqrt(rve_near a) { return _mm512_sqrt_ps(a); }
+RVE_FN rve_near near_fma(rve_near a, rve_near b, rve_near c) { return _mm512_fmadd_ps(a, b, c); }
+RVE_FN rve_near near_fms(rve_near a, rve_near b, rve_near c) { return _mm512_fmsub_ps(a, b, c); }
+RVE_FN rve_near near_fnma(rve_near a, rve_near b, rve_near c) { return _mm512_fnmadd_ps(a, b, c); }
 RVE_FN rve_near near_inverse_sqrt(rve_near a) {
   const rve_near y = _mm512_rsqrt14_ps(a);
   return y * (near_set(1.5) - near_set(0.5) * a * y * y);

@@ -291,7 +291,7 @@ RVE_FN void rve_reorder(const RveCounts *n, const RveArrays *a, RveScratch *s) {
 
 /* Writes slots, histories and incoming lists of the new order. */
 RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s, int pairs) {
-  const int stride = n->row ? n->row : 1, width = n->reaction ? rve_reaction_width(n) : 1;
+  const int stride = n->row ? n->row : 1;
   const int spins = n->dimension == 2 ? 1 : 3;
   int slots = 0, incoming = 0;
   for (int block = 0; block < n->blocks; block++) {
@@ -307,7 +307,7 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
       for (int k = 0; k < spins; k++) a->shear[k][slot] = 0.0;
     }
     for (int e = incoming * RVE_PACK; e < (incoming + in) * RVE_PACK; e++) /* the reaction that stays zero */
-      a->incoming[e] = (uint32_t)(n->slot_rows * RVE_PACK * width);
+      a->incoming[e] = (uint32_t)rve_reaction_at(n, n->slot_rows * RVE_PACK);
     slots += out, incoming += in;
   }
   a->slot_first[n->blocks] = slots, a->incoming_first[n->blocks] = incoming;
@@ -322,7 +322,7 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
     a->neighbour[slot] = (uint32_t)(j * stride);
     a->image[slot] = s->image[c] & (uint16_t)~RVE_IMAGE_FAR;
     a->incoming[(a->incoming_first[j / RVE_PACK] + in) * RVE_PACK + j % RVE_PACK] =
-        (uint32_t)(rve_place(RVE_PACK, slot) * width);
+        (uint32_t)rve_reaction_at(n, slot);
     if (old < 0) continue;
     /* Seen from the other grain the force changes sign; in 2D the tangent (-n_y, n_x) does too. */
     const double sign = n->dimension == 3 && s->first[c] == s->old_second[old] &&

@@ -3,7 +3,7 @@
  * arrays instead.
  *
  * Loading rows and transposing them is faster than gathers where four fields are wanted. On an Intel processor with
- * AVX512-FP16 single fields are gathered as fast (RVE_GATHERS): rows then hold multiples of four fields, and less is written. */
+ * AVX512-FP16 fields are gathered about as fast (RVE_GATHERS): there are no rows in 2D, in 3D they hold eight fields. */
 #ifndef DEMPM_RVE_ROWS_H
 #define DEMPM_RVE_ROWS_H
 
@@ -23,7 +23,9 @@ typedef struct RveTwo {
 #endif
 
 /* RveCounts.row of these kernels. */
-#if defined(RVE_MIXED) || defined(RVE_GATHERS)
+#if defined(RVE_GATHERS)
+RVE_FN int rve_row_doubles(int dimension) { return dimension == 3 ? 8 : 0; }
+#elif defined(RVE_MIXED)
 RVE_FN int rve_row_doubles(int dimension) { return 4 * (dimension - 1); }
 #else
 RVE_FN int rve_row_doubles(int dimension) { return RVE_ROWS * 4 * dimension; }
@@ -232,16 +234,39 @@ RVE_FN void rve_unpair(const RveTwo pair[RVE_SPAN], rve_real sum[2]) {
 #endif
 
 #if defined(RVE_GATHERS)
-/* The numbers of an array, one per lane, of the grains whose rows, of 4 or 8 doubles, begin at offset[lane0...]. */
-RVE_FN rve_real rve_pick(const double *field, const uint32_t *offset, int lane0, int stride) {
-  const __m256i at = _mm256_load_si256((const __m256i *)(const void *)(offset + lane0));
+/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by themselves, or by where their rows of
+ * eight doubles begin. */
+RVE_FN rve_real rve_pick(const double *field, const uint32_t *neighbour, int lane0, int row) {
+  const __m256i at = _mm256_load_si256((const __m256i *)(const void *)(neighbour + lane0));
   rve_real from = rve_set(0.0);
   rve_mask all = 0xff;
   /* All lanes are overwritten, but the processor waits for what they were: gcc 12 would take any register, last used for the row before. */
   __asm__("" : "+v"(from));
   __asm__("" : "+k"(all));
-  return stride == 8 ? _mm512_mask_i32gather_pd(from, all, at, field, 1)
-                     : _mm512_mask_i32gather_pd(from, all, at, field, 2);
+  return row == 8 ? _mm512_mask_i32gather_pd(from, all, at, field, 1) : _mm512_mask_i32gather_pd(from, all, at, field, 8);
+}
+
+/* Two fields of eight consecutive rows of `stride` doubles. */
+RVE_FN void rve_scatter_two(double *rows, int stride, int lane0, rve_real a, rve_real b) {
+  const rve_real even = _mm512_unpacklo_pd(a, b), odd = _mm512_unpackhi_pd(a, b);
+  const __m128d pair[8] = {_mm512_castpd512_pd128(even),       _mm512_castpd512_pd128(odd),
+                           _mm512_extractf64x2_pd(even, 1), _mm512_extractf64x2_pd(odd, 1),
+                           _mm512_extractf64x2_pd(even, 2), _mm512_extractf64x2_pd(odd, 2),
+                           _mm512_extractf64x2_pd(even, 3), _mm512_extractf64x2_pd(odd, 3)};
+  rows += (size_t)lane0 * (size_t)stride;
+  for (int l = 0; l < 8; l++) _mm_store_pd(rows + l * stride, pair[l]);
+}
+
+/* The first six fields of rows of eight, one per lane. */
+RVE_FN void rve_transpose_six(const rve_real row[8], rve_real field[6]) {
+  RveFour four[8];
+  rve_real two[4];
+  for (int k = 0; k < 8; k++) four[k] = _mm512_castpd512_pd256(row[k]);
+  for (int k = 0; k < 4; k++) two[k] = _mm512_shuffle_f64x2(row[k], row[k + 4], 0xee);
+  const RveQuad q = rve_transpose(four);
+  for (int k = 0; k < 4; k++) field[k] = q.f[k];
+  field[4] = rve_even_quarters(_mm512_unpacklo_pd(two[0], two[1]), _mm512_unpacklo_pd(two[2], two[3]));
+  field[5] = rve_even_quarters(_mm512_unpackhi_pd(two[0], two[1]), _mm512_unpackhi_pd(two[2], two[3]));
 }
 #endif
 

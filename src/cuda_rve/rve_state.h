@@ -34,8 +34,8 @@ enum { RVE_LIST_GOOD, RVE_LIST_CHECK /* its running bound is spent */, RVE_LIST_
 typedef struct RveCounts {
   int32_t dimension, grains, lanes, blocks;
   int32_t slot_rows, incoming_rows; /* capacity, in rows of `lanes` */
-  int32_t row;                      /* doubles per grain's row, a multiple of 4; 0: no rows (CUDA) */
-  int32_t reaction; /* doubles per slot's reaction: 4 in FP64, 2 in FP32, half as many more in 3D; 0: arrays */
+  int32_t row;                      /* doubles per grain's row, a multiple of 4; 0: no rows */
+  int32_t reaction; /* doubles per slot's reaction: 4 in FP64, 2 in FP32, half as many more in 3D or RVE_WHOLE; 0: arrays */
 } RveCounts;
 
 /* Everything about an RVE that is not an array. Plain values only: it is copied and stored raw. */
@@ -76,9 +76,10 @@ typedef struct RveArrays {
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist) */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
-  double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_place() of the slot: a plane of four
-                          numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z); the last slots stay zero */
-  double *reaction_more;                /* its second plane */
+  double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_reaction_at() of the slot: a plane of four
+                          numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z), or both together (RVE_WHOLE); the
+                          last slots stay zero */
+  double *reaction_more;                /* its second plane, if there is one */
   double *reaction_field[6];            /* the same as arrays, if counts.reaction = 0 */
   uint32_t *incoming;                   /* [incoming] slot (its place in doubles, if counts.reaction > 0) */
   int32_t *slot_first, *incoming_first; /* [blocks + 1] rows */
@@ -140,8 +141,15 @@ RVE_ANY void *rve_carve(void *base, size_t *used, size_t bytes) {
   return at;
 }
 
-/* Doubles of a slot in the first plane of reactions; half as many in the second. */
-RVE_ANY int rve_reaction_width(const RveCounts *n) { return n->dimension == 2 ? n->reaction : n->reaction / 3 * 2; }
+/* Doubles of a slot in the first plane of reactions; half as many in the second, if there is one. */
+RVE_ANY int rve_reaction_width(const RveCounts *n) {
+  return n->dimension == 2 || n->reaction == RVE_WHOLE ? n->reaction : n->reaction / 3 * 2;
+}
+/* A slot's place there, in doubles; the slot itself if reactions are arrays. */
+RVE_ANY int rve_reaction_at(const RveCounts *n, int slot) {
+  if (n->reaction == 0) return slot;
+  return (n->reaction == RVE_WHOLE ? slot : rve_place(n->lanes, slot)) * rve_reaction_width(n);
+}
 
 /* Lays the arrays behind the head at `base` (NULL: only counts); returns the arena's bytes. */
 RVE_ANY size_t rve_layout(const RveCounts *n, void *base, RveArrays *a) {

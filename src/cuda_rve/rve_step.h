@@ -41,7 +41,7 @@ RVE_FN void rve_advance_cell(const RveCall *call, RveHead *head, double temperat
 
 /* Rows of all grains, after the list has moved them or at the start. */
 RVE_FN void rve_refresh_rows(RveFeatures ft, const RveTeam *team, const RveCounts *n, const RveArrays *a) {
-  const int spans = RVE_ROWS ? n->blocks * RVE_PARTS : 0;
+  const int spans = n->row ? n->blocks * RVE_PARTS : 0;
   for (int span = team->pack; span < spans; span += team->packs) {
     RveBody b = rve_own_body(ft, a, span * RVE_SPAN);
     if (!ft.tangential)

@@ -5,7 +5,7 @@
  * team is one thread; in CUDA it is one number per thread, a span is a warp and a team is a thread block. Lists are
  * laid out for packs of RVE_PACK grains: a span, or RVE_PARTS of them in mixed precision (rve_near.h).
  *
- * CPUs also keep what a neighbour must know of a grain in one row (array of structures), see rve_rows.h. CUDA reads the
+ * Most CPUs also keep what a neighbour must know of a grain in one row (array of structures), see rve_rows.h. CUDA reads the
  * arrays themselves. */
 #ifndef DEMPM_RVE_TEAM_H
 #define DEMPM_RVE_TEAM_H
@@ -35,7 +35,10 @@ typedef struct RveTeam {
 #endif
 #endif
 
-/* Where the reaction of a slot stands: what the registers of a transposed pack hold, written as it is. */
+/* Doubles of a 3D reaction that has a line of the cache to itself, of RveCounts.reaction. */
+enum { RVE_WHOLE = 8 };
+
+/* Where the reaction of a slot stands, if not whole: what the registers of a transposed pack hold, written as it is. */
 RVE_ANY int rve_place(int pack, int slot) {
   if (pack == 8) return (slot & ~7) + 2 * (slot & 3) + (slot >> 2 & 1);
   if (pack == 16) return (slot & ~15) + 4 * (slot & 3) + (slot >> 2 & 3);
@@ -79,6 +82,9 @@ RVE_FN rve_int rve_int_from_real(rve_real a) { return _mm512_cvtpd_epi64(a); }
 RVE_FN rve_int rve_int_from_bits(rve_real a) { return _mm512_castpd_si512(a); }
 RVE_FN rve_real rve_bits_from_int(rve_int a) { return _mm512_castsi512_pd(a); }
 RVE_FN rve_real rve_sqrt(rve_real a) { return _mm512_sqrt_pd(a); }
+RVE_FN rve_real rve_fma(rve_real a, rve_real b, rve_real c) { return _mm512_fmadd_pd(a, b, c); }
+RVE_FN rve_real rve_fms(rve_real a, rve_real b, rve_real c) { return _mm512_fmsub_pd(a, b, c); }
+RVE_FN rve_real rve_fnma(rve_real a, rve_real b, rve_real c) { return _mm512_fnmadd_pd(a, b, c); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return _mm512_min_pd(a, b); }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return _mm512_max_pd(a, b); }
 RVE_FN rve_real rve_abs(rve_real a) { return _mm512_abs_pd(a); }
@@ -151,6 +157,9 @@ RVE_FN rve_int rve_int_from_real(rve_real a) {
 RVE_FN rve_int rve_int_from_bits(rve_real a) { return _mm256_castpd_si256(a); }
 RVE_FN rve_real rve_bits_from_int(rve_int a) { return _mm256_castsi256_pd(a); }
 RVE_FN rve_real rve_sqrt(rve_real a) { return _mm256_sqrt_pd(a); }
+RVE_FN rve_real rve_fma(rve_real a, rve_real b, rve_real c) { return _mm256_fmadd_pd(a, b, c); }
+RVE_FN rve_real rve_fms(rve_real a, rve_real b, rve_real c) { return _mm256_fmsub_pd(a, b, c); }
+RVE_FN rve_real rve_fnma(rve_real a, rve_real b, rve_real c) { return _mm256_fnmadd_pd(a, b, c); }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return _mm256_min_pd(a, b); }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return _mm256_max_pd(a, b); }
 RVE_FN rve_real rve_abs(rve_real a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
@@ -216,6 +225,9 @@ RVE_FN rve_real rve_bits_from_int(rve_int a) {
 }
 #endif
 RVE_FN rve_real rve_sqrt(rve_real a) { return sqrt(a); }
+RVE_FN rve_real rve_fma(rve_real a, rve_real b, rve_real c) { return a * b + c; }
+RVE_FN rve_real rve_fms(rve_real a, rve_real b, rve_real c) { return a * b - c; }
+RVE_FN rve_real rve_fnma(rve_real a, rve_real b, rve_real c) { return c - a * b; }
 RVE_FN rve_real rve_min(rve_real a, rve_real b) { return a < b ? a : b; }
 RVE_FN rve_real rve_max(rve_real a, rve_real b) { return a > b ? a : b; }
 RVE_FN rve_real rve_abs(rve_real a) { return fabs(a); }
@@ -249,10 +261,13 @@ enum { RVE_PARTS = 2 };
 enum { RVE_PARTS = 1 };
 #endif
 enum { RVE_PACK = RVE_PARTS * RVE_SPAN };
+/* Doubles from one slot to the next in RveArrays.incoming, 3D. */
 #if defined(__CUDACC__)
 enum { RVE_REACTION = 1 };
+#elif defined(RVE_GATHERS)
+enum { RVE_REACTION = RVE_WHOLE };
 #else
-enum { RVE_REACTION = 4 / RVE_PARTS }; /* doubles from one slot to the next in RveArrays.incoming */
+enum { RVE_REACTION = 4 / RVE_PARTS };
 #endif
 
 /* Rows of slots whose contacts are computed part by part, see RveRow. */
@@ -260,6 +275,12 @@ enum { RVE_REACTION = 4 / RVE_PARTS }; /* doubles from one slot to the next in R
 enum { RVE_CHUNK = 1, RVE_AHEAD = 0 };
 #else
 enum { RVE_CHUNK = 4, RVE_AHEAD = 1 /* see RveRows */ };
+#endif
+/* Spans whose reactions are summed before they move, 2D. */
+#if defined(RVE_GATHERS)
+enum { RVE_SUM_AHEAD = 1 };
+#else
+enum { RVE_SUM_AHEAD = RVE_CHUNK };
 #endif
 /* 1 where lists of wide cells (RveHead.wide) are worth a form of the contact pass of their own: not in 3D on a Zen 4. */
 #if defined(RVE_GATHERS)

@@ -9,7 +9,7 @@
 static void slot_force(const RveRecord *record, int slot, double f[3]) {
   const RveArrays *a = &record->arrays;
   const int width = rve_reaction_width(&record->counts); /* doubles, or pairs of FP32 */
-  const double *at = a->reaction + (size_t)rve_place(record->counts.lanes, slot) * (size_t)width;
+  const double *at = a->reaction + (width == 0 ? 0 : rve_reaction_at(&record->counts, slot));
   float half[4] = {0};
   if (width == 2) memcpy(half, at, sizeof half);
   f[2] = 0.0;
