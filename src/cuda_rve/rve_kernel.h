@@ -14,7 +14,7 @@
 
 typedef struct RveContactPass {
   rve_near h[9 * RVE_PARTS]; /* H times rve_fraction_unit(); in FP32 also what its rounding left */
-  rve_near rate[9]; /* D */
+  rve_near rate[9]; /* D; without dashpots less D_xx on the diagonal: sliding does not see what is along the branch */
   rve_near turn[9];
   rve_near kn, kt_dt, kt, mu, mu_kn, dt, gn, gt, gc, bond, bond_ratio;
   int turning;
@@ -35,7 +35,7 @@ RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, c
     const double h = head->cell[k] * rve_fraction_unit(ft.wide);
     c.h[k] = near_set(h);
     if (RVE_PARTS == 2) c.h[9 + k] = near_set(h - (float)h);
-    c.rate[k] = near_set(call->rate[k]);
+    c.rate[k] = near_set(call->rate[k] - (!ft.viscous && k % 4 == 0 ? call->rate[0] : 0.0));
     c.turn[k] = near_set(call->turn[k]);
   }
   c.turning = call->turning;
@@ -176,10 +176,12 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
   near_neighbour_motion(ft, a, row->lane0, &other);
   if (ft.viscous) row->other.m = other.m;
   for (int k = 0; k < dim; k++) {
+    const int all = k > 0 || ft.viscous; /* else c->rate[0] = 0 */
     u[k] = other.v[k] - own->v[k];
-    if (dim == 2) u[k] = u[k] + c->rate[3 * k] * row->d[0] + c->rate[3 * k + 1] * row->d[1];
-    else
-      u[k] = u[k] + (lever + other_lever) * near_dot(3, c->rate + 3 * k, n); /* keeping d, too, takes longer */
+    if (dim == 2 && all) u[k] = u[k] + c->rate[3 * k] * row->d[0];
+    if (dim == 2) u[k] = u[k] + c->rate[3 * k + 1] * row->d[1];
+    else if (all) u[k] = u[k] + (lever + other_lever) * near_dot(3, c->rate + 3 * k, n); /* keeping d, too, takes longer */
+    else u[k] = u[k] + (lever + other_lever) * (c->rate[1] * n[1] + c->rate[2] * n[2]);
   }
   if (ft.viscous) row->opening = near_dot(dim, u, n);
   if (!ft.tangential) return;
@@ -315,8 +317,8 @@ typedef struct RveRows {
 RVE_FN void rve_find_row(RveFeatures ft, const RveHead *head, const RveArrays *a, int from, RveRows *rows) {
   rows->row = from;
   while (rows->row < rows->end && head->approach < a->idle_until[rows->row]) rows->row++;
-  /* Behind the last row any will do: a condition would keep the compiler from mixing this with other work. */
-  if (RVE_AHEAD) near_neighbour_place(ft, a, (rows->row < rows->end ? rows->row : 0) * RVE_PACK, &rows->other);
+  /* Behind the last row, too, some neighbours are named: a condition would cost more than they do. */
+  if (RVE_AHEAD) near_neighbour_place(ft, a, rows->row * RVE_PACK, &rows->other);
 }
 
 RVE_FN RveNearBody rve_take_row(RveFeatures ft, const RveHead *head, const RveArrays *a, RveRows *rows) {

@@ -312,6 +312,7 @@ RVE_FN void rve_fill_slots(const RveCounts *n, const RveArrays *a, RveScratch *s
   }
   a->slot_first[n->blocks] = slots, a->incoming_first[n->blocks] = incoming;
   a->idle_until[n->slot_rows] = 1e300;
+  for (int slot = slots * RVE_PACK; slot < (slots + 1) * RVE_PACK; slot++) a->neighbour[slot] = 0; /* RveRows reads on */
   for (int i = 0; i < n->blocks * RVE_PACK; i++) s->out[i] = s->out_far[i] = s->in[i] = s->in_far[i] = 0;
   for (int c = 0; c < pairs; c++) {
     const int i = s->place[s->first[c]], j = s->place[s->second[c]], old = s->history[c];
@@ -430,6 +431,7 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   }
   rve_balance(n, s, pairs);
   rve_rank(n, s, &slot_rows, &incoming_rows);
+  slot_rows++; /* the one behind the last */
   if (slot_rows > n->slot_rows || incoming_rows > n->incoming_rows) {
     head->need_pairs = s->pairs;
     head->need_slot_rows = slot_rows > n->slot_rows ? slot_rows + slot_rows / 4 + 4 : n->slot_rows;

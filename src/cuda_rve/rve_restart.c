@@ -143,7 +143,8 @@ BaseStatus rve_record_unpack(const RveKernels *kernels, uint64_t scene_hash, con
   fresh.conduction = header.conduction;
   const int dim = header.counts.dimension - 2;
   *canonical = header.counts.lanes != kernels->lanes || header.counts.row != kernels->row[dim] ||
-               header.counts.reaction != kernels->reaction[dim];
+               header.counts.reaction != kernels->reaction[dim] ||
+               fresh.arrays.slot_first[header.counts.blocks] >= header.counts.slot_rows; /* once there could be no row behind */
   if (*canonical) {
     BaseStatus status = ids_are_a_permutation(&fresh)
                             ? rve_record_convert(kernels, &fresh, &converted)

@@ -73,7 +73,7 @@ typedef struct RveArrays {
   double *radius, *reference_radius, *mass, *inverse_mass, *inverse_inertia; /* [N] */
   int32_t *id;         /* [N] index of the grain in its packing; -1 padding */
   double *row;         /* [N][counts.row] what neighbours read, see rve_body.h */
-  uint32_t *neighbour; /* [slot] j (times counts.row if rows exist) */
+  uint32_t *neighbour; /* [slot] j (times counts.row if rows exist); one row more than the list has */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
   double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_reaction_at() of the slot: a plane of four
