@@ -55,8 +55,9 @@ class Dempm:
         return self.program.exists()
 
     def command(self, dimension, skin, steps):
-        # As many repetitions as make a run of about a second: the shorter ones would be at the mercy of the timer tick.
-        repeat = max(1, round((10 if dimension == 2 else 2) * steps / STEPS))
+        # As many repetitions as make a run of about a second, or as long as the others' where skins are tried: shorter ones would
+        # be at the mercy of the timer tick.
+        repeat = 10 if dimension == 2 else 2
         return [self.program, DATA[dimension], dimension, "steps", steps, "skin", skin, "repeat", repeat, *self.settings]
 
     def read(self, output):

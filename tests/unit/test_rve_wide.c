@@ -11,6 +11,15 @@ enum { STRAINS = 60 };
 /* Nearest image of s_j - s_i, in units of a cell edge / 2^60; what the kernel takes in its stead. */
 static int64_t nearest(int64_t si, int64_t sj) { return (int64_t)(((uint64_t)sj - (uint64_t)si) << 4) / 16; }
 
+/* The contact pass reads one row behind the last: there must be one, and it must name grains. */
+static void assert_row_behind(const RveRecord *record) {
+  const RveCounts *n = &record->counts;
+  const int rows = record->arrays.slot_first[n->blocks];
+  assert_true(rows > 0 && rows < n->slot_rows);
+  for (int lane = 0; lane < n->lanes; lane++)
+    assert_true(record->arrays.neighbour[rows * n->lanes + lane] < (uint32_t)(n->blocks * n->lanes * (n->row ? n->row : 1)));
+}
+
 /* Pairs whose image is not the nearest one's. */
 static int strays(const RveRecord *record, int *pairs, int *empty) {
   const RveCounts *n = &record->counts;
@@ -51,6 +60,7 @@ static void strain(const RvePacking *packing) {
   for (int call = 0; call < STRAINS; call++) {
     help_step(batch, motion[3 * call / STRAINS], 0.0, 5e-3);
     const RveRecord *record = &batch->record[0];
+    assert_row_behind(record);
     wide += rve_head(record->arena)->wide;
     if (!rve_head(record->arena)->wide) continue;
     const int found = strays(record, &pairs, &empty);
