@@ -59,14 +59,14 @@ CU_SOURCES := $(if $(NVCC),$(wildcard src/cuda_rve/*.cu))
 # The RVE kernels once per instruction set, chosen at run time. All lanes run the same code: contraction is safe there. The
 # pass that fuses products belongs to -O2; asked for by name, sanitized builds at -O1 round as the others do.
 KERNEL_SOURCE := $(wildcard src/cuda_rve/rve_backend_cpu.c)
-ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512 avx512_gather avx512_mixed)
+ISAS := plain $(if $(filter x86_64,$(shell uname -m)),avx2 avx512 avx512_whole avx512_mixed)
 FUSE = -ffp-contract=fast -fexpensive-optimizations
 ISA_plain = $(FUSE)
 ISA_avx2 = $(FUSE) -mavx2 -mfma
 # The last two were found by trial on a Zen 4: 3 to 12 % faster than gcc 12's default tuning.
 ISA_avx512 = $(FUSE) -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mprefer-vector-width=512 -mtune=skylake-avx512 \
              -fno-tree-pre
-ISA_avx512_gather = $(ISA_avx512)
+ISA_avx512_whole = $(ISA_avx512)
 ISA_avx512_mixed = $(ISA_avx512)
 # A row of 2D is one long piece of code. On a Zen 4 it is 1.06 times as fast if ordered by the latency of its instructions before registers
 # are given out; ordering it again afterwards loses a third of that. Slower in 3D, whose rows are computed in short loops, and on Intel.

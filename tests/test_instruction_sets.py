@@ -8,7 +8,7 @@ import pytest
 from conftest import BUILD, ROOT, execute
 
 AVX512 = {"avx512f", "avx512dq", "avx512vl", "avx512bw", "avx2", "fma"}
-NEEDS = {"plain": set(), "avx2": {"avx2", "fma"}, "avx512": AVX512, "avx512_gather": AVX512}
+NEEDS = {"plain": set(), "avx2": {"avx2", "fma"}, "avx512": AVX512, "avx512_whole": AVX512}
 PROGRAMS = ["test_rve_crystal", "test_rve_energy", "test_rve_gas", "test_rve_limits", "test_rve_resting"]
 
 

@@ -70,9 +70,8 @@ typedef struct RveScene {
                                  results are the same to the last bit; CPU only. 0: each by itself, e.g. to time them */
   int flight;                 /* 1: calls in which no grains can meet are answered in closed form, equal to the steps but for
                                  round-off (default); 0: they are stepped */
-  int resting;                /* 1: rows of pairs that cannot touch yet are skipped, and images are not looked up in cells so wide
-                                 that each pair is the nearest; the results are the same to the last bit (default); 0: every
-                                 pair and image in every step, to prove it */
+  int resting;                /* 1: rows of pairs that cannot touch yet are skipped; the results are the same to the last bit
+                                 (default); 0: every pair in every step, to prove it */
   int mixed;                  /* 1: contact forces in FP32, sums and positions as ever; needs AVX-512, else FP64 runs (see
                                  rve_batch_backend_name). Stresses differ by about 1e-5 of the mean stress. Default 0 */
   int threads;                /* OpenMP threads; 0 = OpenMP's own choice */

@@ -21,7 +21,7 @@ typedef struct RveKernels {
 } RveKernels;
 extern const RveKernels rve_kernels_plain;
 #if defined(__x86_64__)
-extern const RveKernels rve_kernels_avx2, rve_kernels_avx512, rve_kernels_avx512_gather, rve_kernels_avx512_mixed;
+extern const RveKernels rve_kernels_avx2, rve_kernels_avx512, rve_kernels_avx512_whole, rve_kernels_avx512_mixed;
 #endif
 
 /* The device. Arenas live there; all functions work on a whole batch. */

@@ -19,14 +19,14 @@ static const RveTeam alone = {0, 1, 1, 0};
 /* Stamps out one variant: the features are constants in it. */
 #define VARIANT(name, tangential, viscous, bonds)                                                                      \
   static int run_##name(const RveCall *call, void *arena, const RveCounts *n, RveScratch *s) {                         \
-    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds, 0};                                             \
+    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds};                                             \
     RveArrays a;                                                                                                       \
     rve_layout(n, arena, &a);                                                                                          \
     return (int)rve_run(ft, &alone, call, rve_head(arena), n, &a, s);                                                  \
   }                                                                                                                    \
   static void measure_##name(const RveCall *call, void *arena, const RveCounts *n, double work, double duration,       \
                              RveAnswer *answer) {                                                                      \
-    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds, 0};                                             \
+    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds};                                             \
     RveArrays a;                                                                                                       \
     rve_layout(n, arena, &a);                                                                                          \
     rve_measure(ft, &alone, call, rve_head(arena), n, &a, work, duration, answer);                                     \
@@ -51,12 +51,15 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
   measure_table[variant_of(ft)](call, arena, n, work, duration, answer);
 }
 
+/* rve_row_doubles(), and the same of reactions. */
 #if defined(RVE_MIXED)
-#define ROWS {4, 8}, {2, 3} /* rve_row_doubles() */
-#elif defined(RVE_GATHERS)
-#define ROWS {0, 8}, {4, RVE_WHOLE}
+#define ROWS {4, 8}, {2, 3}
+#elif defined(RVE_WHOLE_REACTIONS)
+#define ROWS {4, 8}, {4, RVE_WHOLE}
+#elif RVE_CARRIES
+#define ROWS {4, 8}, {4, 6}
 #else
-#define ROWS {8, 12}, {4, 6}
+#define ROWS {0, 0}, {4, 6}
 #endif
 #if RVE_DIMENSION == 3
 const RveKernels RVE_NAME(rve_kernels_3d) = {RVE_TEXT, RVE_PACK, ROWS, run, measure};

@@ -58,7 +58,7 @@ static __global__ void __launch_bounds__(32 * WARPS_MAX, 1) step_rves(DeviceJob 
   __shared__ RveCall call;
   __shared__ double lanes[WARPS_MAX];
   DeviceJob *const mine = &jobs[blockIdx.x];
-  const RveFeatures ft = {dimension, tangential, viscous, bonds, 0};
+  const RveFeatures ft = {dimension, tangential, viscous, bonds};
   const RveTeam team = {(int)(threadIdx.x / 32), (int)(blockDim.x / 32), threadIdx.x == 0, lanes};
   char *const arena = in_shared ? memory : mine->arena;
   if (team.leader) {

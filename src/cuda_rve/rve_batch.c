@@ -14,8 +14,8 @@
 /* -------------------------------------------------------------------------------------------------- which kernels */
 
 #if defined(__x86_64__)
-/* Intel's processors from Sapphire Rapids on, the first with AVX512-FP16. One of them was measured; on others rows are the known good. */
-static int gathers_are_fast(void) {
+/* Intel's processors from Sapphire Rapids on, the first with AVX512-FP16. One of them was measured; on others two planes are the known good. */
+static int whole_lines_are_fast(void) {
   unsigned a, b, c, d;
   return __builtin_cpu_is("intel") && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (d >> 23 & 1);
 }
@@ -24,8 +24,8 @@ static int gathers_are_fast(void) {
 static const RveKernels *avx512_kernels(const char *wanted, int mixed) {
   if (mixed) return &rve_kernels_avx512_mixed;
   if (wanted && strcmp(wanted, "avx512") == 0) return &rve_kernels_avx512;
-  if (wanted && strcmp(wanted, "avx512_gather") == 0) return &rve_kernels_avx512_gather;
-  return gathers_are_fast() ? &rve_kernels_avx512_gather : &rve_kernels_avx512;
+  if (wanted && strcmp(wanted, "avx512_whole") == 0) return &rve_kernels_avx512_whole;
+  return whole_lines_are_fast() ? &rve_kernels_avx512_whole : &rve_kernels_avx512;
 }
 #endif
 

@@ -9,6 +9,7 @@
 
 /* A pack of grains. */
 typedef struct RveBody {
+  int lane0; /* of grains that stand side by side: the first */
   rve_int s[3];
   rve_real v[3], w[3], r, m;
 } RveBody;
@@ -28,6 +29,7 @@ RVE_FN rve_real rve_dot(int dim, const rve_real a[3], const rve_real b[3]) {
 
 RVE_FN RveBody rve_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
   RveBody own;
+  own.lane0 = lane0;
   for (int k = 0; k < ft.dimension; k++) {
     own.s[k] = rve_load_int(a->position[k], lane0);
     own.v[k] = rve_load(a->velocity[k], lane0);
@@ -39,10 +41,8 @@ RVE_FN RveBody rve_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
   return own;
 }
 
-/* Fractional branch s_j - s_i + P along cell edge k, in units. Where it is shorter than half an edge (wide), whole edges
- * leave a number of 64 bits by themselves: in units of 2^-64 edges. */
-RVE_FN rve_int rve_fraction(int wide, rve_int si, rve_int sj, rve_int image, int k) {
-  if (wide) return rve_int_shift_left(rve_int_subtract(sj, si), 4);
+/* Fractional branch s_j - s_i + P along cell edge k, in units. */
+RVE_FN rve_int rve_fraction(rve_int si, rve_int sj, rve_int image, int k) {
   const rve_int top = rve_set_int((int64_t)((uint64_t)15 << 60));
   const rve_int shift =
       k == 0 ? rve_int_shift_left(image, 60)
@@ -50,79 +50,130 @@ RVE_FN rve_int rve_fraction(int wide, rve_int si, rve_int sj, rve_int image, int
   return rve_int_add(rve_int_subtract(sj, si), shift);
 }
 
-/* The unit of rve_fraction(), cell edges. */
-RVE_FN double rve_fraction_unit(int wide) { return wide ? RVE_UNIT / 16.0 : RVE_UNIT; }
-
 /* x_j - x_i; h: H times the unit. */
-RVE_FN void rve_branch(int dim, int wide, const rve_real h[9], const rve_int si[3], const rve_int sj[3], rve_int image,
-                       rve_real d[3]) {
+RVE_FN void rve_branch(int dim, const rve_real h[9], const rve_int si[3], const rve_int sj[3], rve_int image, rve_real d[3]) {
   rve_real x[3];
-  for (int k = 0; k < dim; k++) x[k] = rve_real_from_int(rve_fraction(wide, si[k], sj[k], image, k));
+  for (int k = 0; k < dim; k++) x[k] = rve_real_from_int(rve_fraction(si[k], sj[k], image, k));
   for (int k = 0; k < dim; k++) {
     d[k] = h[3 * k] * x[0] + h[3 * k + 1] * x[1];
     if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
   }
 }
 
+/* How branches follow the flow from one step to the next. */
+typedef struct RveCarry {
+  rve_near map[9], dt; /* exp(L dt) - 1; s */
+  int fresh;           /* 1: in this pass positions give all branches */
+} RveCarry;
+
 #ifndef RVE_MIXED
 /* ------------------------------------------------------------------------------------------------------------- FP64 */
 
 typedef RveBody RveNearBody;
 #define near_own_body rve_own_body
-#define near_branch rve_branch
 #define near_dot rve_dot
 
-#if defined(RVE_GATHERS)
-/* Rows, in 3D only, are s v_x | v_y v_z w_x w_y; what else is wanted comes from the arrays. */
-
-/* Places and radii of neighbours (2D: and all else); then the rest. */
-RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
-  const double *const none[4] = {0, 0, 0, 0};
-  const int row = rve_row_doubles(ft.dimension);
-  if (ft.dimension == 3) {
-    const RveQuad q = rve_gather(a->row, none, a->neighbour, lane0);
-    for (int k = 0; k < 3; k++) other->s[k] = rve_int_from_bits(q.f[k]);
-    other->v[0] = q.f[3];
-    other->r = rve_pick(a->radius, a->neighbour, lane0, row);
-    return;
-  }
-  for (int k = 0; k < 2; k++)
-    other->s[k] = rve_int_from_bits(rve_pick((const double *)a->position[k], a->neighbour, lane0, row));
-  other->r = rve_pick(a->radius, a->neighbour, lane0, row);
-  for (int k = 0; k < 2; k++) other->v[k] = rve_pick(a->velocity[k], a->neighbour, lane0, row);
-  if (ft.tangential) other->w[0] = rve_pick(a->spin[0], a->neighbour, lane0, row);
-  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, row);
+/* Where the neighbours are. */
+RVE_FN void rve_neighbour_position(int dim, const RveArrays *a, int lane0, RveBody *other) {
+  for (int k = 0; k < dim; k++)
+    other->s[k] =
+        rve_int_from_bits(rve_pick((const double *)(const void *)a->position[k], a->neighbour, lane0, rve_row_doubles(dim)));
 }
 
+#if !RVE_CARRIES /* CUDA and plain code: arrays are read, positions give all branches */
+/* Places and radii of neighbours; then the rest. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  rve_neighbour_position(ft.dimension, a, lane0, other);
+  other->r = rve_pick(a->radius, a->neighbour, lane0, 0);
+}
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  for (int k = 0; k < ft.dimension; k++) other->v[k] = rve_pick(a->velocity[k], a->neighbour, lane0, 0);
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) other->w[k] = rve_pick(a->spin[k], a->neighbour, lane0, 0);
+  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, 0);
+}
+RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
+  (void)ft;
+  kept->r = other->r;
+}
+RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
+  (void)dimension, (void)a, (void)lane0, (void)b; /* arrays are read */
+}
+
+RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_real h[9], const RveArrays *a, const RveBody *own,
+                             const RveBody *other, int lane0, rve_real u[3], rve_real d[3]) {
+  (void)carry, (void)u;
+  rve_branch(ft.dimension, h, own->s, other->s, rve_load_short(a->image, lane0), d);
+}
+
+#else
+/* Rows: 2D v w r, 3D v r | w m. Positions are seldom wanted, and masses in 2D: these come from the arrays. */
+
+/* Velocities and radii of neighbours (2D: and all else); then the rest. */
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+  const RveQuad q = rve_gather(a->row, a->neighbour, lane0);
+  for (int k = 0; k < ft.dimension; k++) other->v[k] = q.f[k];
+  if (ft.dimension == 2) other->w[0] = q.f[2];
+  other->r = q.f[3];
+  if (ft.dimension == 2 && ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, rve_row_doubles(2));
+}
 RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   if (ft.dimension == 2) return;
-  const double *const none[4] = {0, 0, 0, 0};
-  const RveQuad q = rve_gather(a->row + 4, none, a->neighbour, lane0);
-  const int row = rve_row_doubles(3);
-  for (int k = 0; k < 2; k++) other->v[k + 1] = q.f[k], other->w[k] = q.f[k + 2];
-  if (ft.tangential) other->w[2] = rve_pick(a->spin[2], a->neighbour, lane0, row);
-  if (ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, row);
+  const RveQuad q = rve_gather(a->row + 4, a->neighbour, lane0);
+  for (int k = 0; k < 3; k++) other->w[k] = q.f[k];
+  other->m = q.f[3];
 }
 
 /* Of what near_neighbour_place has read, what is still needed once the branch is known. */
 RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
   kept->r = other->r;
-  kept->v[0] = other->v[0];
   if (ft.dimension == 3) return;
-  kept->v[1] = other->v[1];
-  if (ft.tangential) kept->w[0] = other->w[0];
+  kept->w[0] = other->w[0];
   if (ft.viscous) kept->m = other->m;
 }
 
+/* Writes the rows of the pack at lane0. */
 RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
-  if (dimension == 2) return;
   double *const none[4] = {0, 0, 0, 0};
-  const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), rve_bits_from_int(b->s[2]), b->v[0]}};
-  const RveQuad p = {{b->v[1], b->v[2], b->w[0], b->w[1]}};
-  rve_scatter(a->row, rve_row_doubles(3), none, lane0, q);
-  rve_scatter(a->row + 4, rve_row_doubles(3), none, lane0, p);
+  const int stride = rve_row_doubles(dimension);
+  if (dimension == 2) {
+    const RveQuad q = {{b->v[0], b->v[1], b->w[0], b->r}};
+    rve_scatter(a->row, stride, none, lane0, q);
+    return;
+  }
+  const RveQuad q = {{b->v[0], b->v[1], b->v[2], b->r}}, p = {{b->w[0], b->w[1], b->w[2], b->m}};
+  rve_scatter(a->row, stride, none, lane0, q);
+  rve_scatter(a->row + 4, stride, none, lane0, p);
 }
 
+/* Branches d, and the relative velocities u of the fluctuations. With s += H^-1 v dt and H <- exp(L dt) H a branch follows as
+ * d <- exp(L dt) (d + u dt): the same as from positions but for round-off, without reading these or looking up images. A row in which
+ * nothing touched the step before has no branches, it may have rested since. */
+RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_real h[9], const RveArrays *a, const RveBody *own,
+                             const RveBody *other, int lane0, rve_real u[3], rve_real d[3]) {
+  const int dim = ft.dimension;
+  double *const idle = &a->idle_until[lane0 / RVE_PACK];
+  int64_t rested; /* compared as an integer: it is 0 or not */
+  memcpy(&rested, idle, sizeof rested);
+  for (int k = 0; k < dim; k++) u[k] = other->v[k] - own->v[k];
+  if (__builtin_expect(carry->fresh || rested, 0)) {
+    RveBody i, j;
+    for (int k = 0; k < dim; k++) i.s[k] = rve_load_int(a->position[k], own->lane0);
+    rve_neighbour_position(dim, a, lane0, &j);
+    rve_branch(dim, h, i.s, j.s, rve_load_short(a->image, lane0), d);
+    *idle = 0.0;
+  } else {
+    rve_real e[3];
+    for (int k = 0; k < dim; k++) e[k] = rve_load(a->branch[k], lane0) + carry->dt * u[k];
+    for (int k = 0; k < dim; k++) {
+      d[k] = rve_fma(carry->map[3 * k], e[0], rve_fma(carry->map[3 * k + 1], e[1], e[k]));
+      if (dim == 3) d[k] = rve_fma(carry->map[3 * k + 2], e[2], d[k]);
+    }
+  }
+  for (int k = 0; k < dim; k++) rve_store(a->branch[k], lane0, d[k]);
+}
+#endif
+
+#if defined(RVE_WHOLE_REACTIONS)
 /* 3D reactions are whole, so that one addition takes all of one: f t_x | t_y t_z, and two numbers that nobody reads. */
 RVE_FN void rve_write_reaction_3d(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
   double *const none[4] = {0, 0, 0, 0};
@@ -137,70 +188,6 @@ RVE_FN RveQuad rve_read_reaction_3d(const RveArrays *a, int lane0) {
 }
 
 #else
-/* Rows have all that contacts ask for: 2D s v | w r m, 3D s r | v m | w. */
-
-/* Places and radii of neighbours (2D: and all else, their rows are short); then the rest. */
-RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
-  if (ft.dimension == 2) {
-    const double *const f0[4] = {(const double *)a->position[0], (const double *)a->position[1], a->velocity[0],
-                                 a->velocity[1]};
-    const double *const f1[4] = {a->spin[0], a->radius, ft.viscous ? a->mass : 0, 0};
-    const RveQuad q = rve_gather(a->row, f0, a->neighbour, lane0);
-    RveQuad p;
-    if (ft.viscous) p = rve_gather(a->row + 4, f1, a->neighbour, lane0);
-    else rve_gather_pair(a->row + 4, f1, a->neighbour, lane0, p.f), p.f[2] = rve_set(0.0);
-    for (int k = 0; k < 2; k++) other->s[k] = rve_int_from_bits(q.f[k]), other->v[k] = q.f[k + 2];
-    other->w[0] = p.f[0], other->r = p.f[1], other->m = p.f[2];
-    return;
-  }
-  const double *const f[4] = {(const double *)a->position[0], (const double *)a->position[1],
-                              (const double *)a->position[2], a->radius};
-  const RveQuad q = rve_gather(a->row, f, a->neighbour, lane0);
-  for (int k = 0; k < 3; k++) other->s[k] = rve_int_from_bits(q.f[k]);
-  other->r = q.f[3];
-}
-
-RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
-  if (ft.dimension == 2) return;
-  const double *const f0[4] = {a->velocity[0], a->velocity[1], a->velocity[2], ft.viscous ? a->mass : 0};
-  const double *const f1[4] = {a->spin[0], a->spin[1], a->spin[2], 0};
-  const RveQuad q = rve_gather(a->row + 4, f0, a->neighbour, lane0);
-  for (int k = 0; k < 3; k++) other->v[k] = q.f[k];
-  other->m = q.f[3];
-  if (!ft.tangential) return;
-  const RveQuad t = rve_gather(a->row + 8, f1, a->neighbour, lane0);
-  for (int k = 0; k < 3; k++) other->w[k] = t.f[k];
-}
-
-/* Of what near_neighbour_place has read, what is still needed once the branch is known. */
-RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
-  kept->r = other->r;
-  if (ft.dimension == 3) return;
-  for (int k = 0; k < 2; k++) kept->v[k] = other->v[k];
-  kept->w[0] = other->w[0], kept->m = other->m;
-}
-
-/* Writes the rows (or nothing, where arrays are read directly) of the pack at lane0. */
-RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
-  if (!RVE_ROWS) return;
-  double *const none[4] = {0, 0, 0, 0};
-  double *const rows = a->row;
-  const int stride = rve_row_doubles(dimension);
-  const rve_real zero = rve_set(0.0);
-  if (dimension == 2) {
-    const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), b->v[0], b->v[1]}};
-    const RveQuad p = {{b->w[0], b->r, b->m, zero}};
-    rve_scatter(rows, stride, none, lane0, q);
-    rve_scatter(rows + 4, stride, none, lane0, p);
-  } else {
-    const RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), rve_bits_from_int(b->s[2]), b->r}};
-    const RveQuad p = {{b->v[0], b->v[1], b->v[2], b->m}}, t = {{b->w[0], b->w[1], b->w[2], zero}};
-    rve_scatter(rows, stride, none, lane0, q);
-    rve_scatter(rows + 4, stride, none, lane0, p);
-    rve_scatter(rows + 8, stride, none, lane0, t);
-  }
-}
-
 RVE_FN void rve_write_reaction_3d(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
   double *const *const field = a->reaction_field;
   double *const f[4] = {field[0], field[1], field[2], ft.tangential ? field[3] : 0};
@@ -217,6 +204,7 @@ RVE_FN RveQuad rve_read_reaction_3d(const RveArrays *a, int lane0) {
 
 RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
   RveBody other;
+  rve_neighbour_position(ft.dimension, a, lane0, &other);
   near_neighbour_place(ft, a, lane0, &other);
   near_neighbour_motion(ft, a, lane0, &other);
   return other;
@@ -274,7 +262,7 @@ RVE_FN rve_real near_neighbour_mass(const RveArrays *a, int lane0) {
 
 /* In 2D one row has all. */
 RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
-  const RveQuad p = rve_gather(a->row, 0, a->neighbour, lane0), q = rve_gather(a->row, 0, a->neighbour, lane0 + 8);
+  const RveQuad p = rve_gather(a->row, a->neighbour, lane0), q = rve_gather(a->row, a->neighbour, lane0 + 8);
   for (int k = 0; k < ft.dimension; k++) {
     other->s[k].half[0] = rve_int_from_bits(p.f[k]);
     other->s[k].half[1] = rve_int_from_bits(q.f[k]);
@@ -296,8 +284,8 @@ RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0,
                            _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
     return;
   }
-  const RveQuad t = rve_gather(a->row + 4, 0, a->neighbour, lane0),
-                u = rve_gather(a->row + 4, 0, a->neighbour, lane0 + 8);
+  const RveQuad t = rve_gather(a->row + 4, a->neighbour, lane0),
+                u = rve_gather(a->row + 4, a->neighbour, lane0 + 8);
   for (int k = 0; k < 3; k++) other->v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
   for (int k = 0; ft.tangential && k < 3; k++)
     other->w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
@@ -315,7 +303,7 @@ RVE_FN void near_keep_place(RveFeatures ft, const RveNearBody *other, RveNearBod
 
 RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
   RveBody other;
-  const RveQuad p = rve_gather(a->row, 0, a->neighbour, lane0);
+  const RveQuad p = rve_gather(a->row, a->neighbour, lane0);
   for (int k = 0; k < ft.dimension; k++) other.s[k] = rve_int_from_bits(p.f[k]);
   if (ft.dimension == 2) {
     for (int k = 0; k < 2; k++) other.v[k] = near_pair_part(p.f[2], k);
@@ -323,7 +311,7 @@ RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0)
     if (ft.viscous) other.m = near_neighbour_mass(a, lane0);
     return other;
   }
-  const RveQuad t = rve_gather(a->row + 4, 0, a->neighbour, lane0);
+  const RveQuad t = rve_gather(a->row + 4, a->neighbour, lane0);
   other.r = near_pair_part(p.f[3], 0), other.m = near_pair_part(p.f[3], 1);
   for (int k = 0; k < 3; k++) {
     other.v[k] = near_pair_part(t.f[k / 2], k % 2);
@@ -349,20 +337,26 @@ RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const R
 }
 
 /* The rounding of H alone would stretch all branches of a direction alike. */
-RVE_FN void near_branch(int dim, int wide, const rve_near h[18], const near_int si[3], const near_int sj[3], near_image image,
+RVE_FN void near_branch(int dim, const rve_near h[18], const near_int si[3], const near_int sj[3], near_image image,
                         rve_near d[3]) {
   const rve_int low = _mm512_cvtepu16_epi64(_mm256_castsi256_si128(image)),
                 high = _mm512_cvtepu16_epi64(_mm256_extracti128_si256(image, 1));
   rve_near x[3];
   for (int k = 0; k < dim; k++)
-    x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(wide, si[k].half[0], sj[k].half[0], low, k)),
-                     _mm512_cvtepi64_ps(rve_fraction(wide, si[k].half[1], sj[k].half[1], high, k)));
+    x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(si[k].half[0], sj[k].half[0], low, k)),
+                     _mm512_cvtepi64_ps(rve_fraction(si[k].half[1], sj[k].half[1], high, k)));
   for (int k = 0; k < dim; k++) {
     d[k] = h[9 + 3 * k] * x[0] + h[9 + 3 * k + 1] * x[1];
     if (dim == 3) d[k] = d[k] + h[9 + 3 * k + 2] * x[2];
     d[k] = d[k] + h[3 * k] * x[0] + h[3 * k + 1] * x[1];
     if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
   }
+}
+
+RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_near h[18], const RveArrays *a,
+                             const RveNearBody *own, const RveNearBody *other, int lane0, rve_near u[3], rve_near d[3]) {
+  (void)carry, (void)u;
+  near_branch(ft.dimension, h, own->s, other->s, near_load_image(a->image, lane0), d);
 }
 
 RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
@@ -405,7 +399,7 @@ RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) 
   return head->approach < until;
 }
 
-#if defined(RVE_GATHERS)
+#if defined(RVE_WHOLE_REACTIONS)
 /* rve_sum_reactions() of whole reactions. */
 RVE_FN void rve_sum_whole(const RveHead *head, const RveArrays *a, int block, rve_real force[3], rve_real torque[3]) {
   rve_real sum[8], field[6];
@@ -429,7 +423,7 @@ RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArra
 #else
   const double *const more = a->reaction_more;
   const int second = ft.dimension == 3 && ft.tangential;
-#if defined(RVE_GATHERS)
+#if defined(RVE_WHOLE_REACTIONS)
   if (second) {
     rve_sum_whole(head, a, block, force, torque);
     return;

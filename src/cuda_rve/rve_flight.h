@@ -84,7 +84,7 @@ RVE_PART void rve_plan_flight(int dim, const RveCall *call, const RveHead *head,
 /* 1 if some pair of the list may touch: its nearest approach on a straight line, less what M is off the line, and squeezed. */
 RVE_FN int rve_may_meet(RveFeatures ft, const RveTeam *team, const RveFlight *flight, const RveHead *head, const RveCounts *n,
                         const RveArrays *a) {
-  const RveFeatures all = {ft.dimension, 0, 1, 0, 0}; /* velocities are needed below */
+  const RveFeatures all = {ft.dimension, 0, 1, 0}; /* velocities are needed below */
   const int dim = ft.dimension;
   /* A part in a million more: FP32 forces reach as far as their rounding. */
   const rve_real growth = rve_set(flight->scale_max / head->scale * (1.0 + 1e-6) / flight->squeeze);
@@ -98,7 +98,7 @@ RVE_FN int rve_may_meet(RveFeatures ft, const RveTeam *team, const RveFlight *fl
       const int lane0 = row * RVE_PACK + part;
       const RveBody other = rve_neighbour_body(all, a, lane0);
       rve_real d[3], w[3];
-      rve_branch(dim, 0, h, own.s, other.s, rve_load_short(a->image, lane0), d);
+      rve_branch(dim, h, own.s, other.s, rve_load_short(a->image, lane0), d);
       for (int k = 0; k < dim; k++) w[k] = other.v[k] - own.v[k];
       const rve_real square = rve_dot(dim, w, w);
       const rve_real when = (zero - rve_dot(dim, d, w)) / (square + rve_set(1e-300));

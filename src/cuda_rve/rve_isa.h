@@ -8,7 +8,7 @@
 #define RVE_NUMBER_avx2 2
 #define RVE_NUMBER_avx512 3
 #define RVE_NUMBER_avx512_mixed 4
-#define RVE_NUMBER_avx512_gather 5
+#define RVE_NUMBER_avx512_whole 5
 #define RVE_NUMBER_OF(isa) RVE_NUMBER_##isa
 #define RVE_NUMBER(isa) RVE_NUMBER_OF(isa)
 #if RVE_NUMBER(RVE_ISA) == 1
@@ -22,7 +22,7 @@
 #define RVE_MIXED 1
 #elif RVE_NUMBER(RVE_ISA) == 5
 #define RVE_ISA_AVX512 1
-#define RVE_GATHERS 1
+#define RVE_WHOLE_REACTIONS 1
 #endif
 
 #define RVE_JOIN_OF(name, isa) name##_##isa

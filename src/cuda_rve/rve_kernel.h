@@ -17,6 +17,7 @@ typedef struct RveContactPass {
   rve_near rate[9]; /* D; without dashpots less D_xx on the diagonal: sliding does not see what is along the branch */
   rve_near turn[9];
   rve_near kn, kt_dt, kt, mu, mu_kn, dt, gn, gt, gc, bond, bond_ratio;
+  RveCarry carry;
   int turning;
 } RveContactPass;
 
@@ -32,13 +33,16 @@ RVE_FN double rve_bond_force_factor(const RveCall *call, double temperature) {
 RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, const RveHead *head, double dt) {
   RveContactPass c;
   for (int k = 0; k < 9; k++) {
-    const double h = head->cell[k] * rve_fraction_unit(ft.wide);
+    const double h = head->cell[k] * RVE_UNIT;
     c.h[k] = near_set(h);
     if (RVE_PARTS == 2) c.h[9 + k] = near_set(h - (float)h);
     c.rate[k] = near_set(call->rate[k] - (!ft.viscous && k % 4 == 0 ? call->rate[0] : 0.0));
     c.turn[k] = near_set(call->turn[k]);
   }
   c.turning = call->turning;
+  for (int k = 0; k < 9; k++) c.carry.map[k] = near_set(call->step_map[k]);
+  c.carry.dt = near_set(dt);
+  c.carry.fresh = !head->carried || dt == 0.0 || head->steps % RVE_FRESH == 0;
   c.kn = near_set(call->normal_stiffness);
   c.kt = near_set(call->tangential_stiffness);
   c.kt_dt = near_set(call->tangential_stiffness * dt);
@@ -113,6 +117,7 @@ typedef struct RveRow {
   int lane0;
   near_image image;
   near_mask touch, bonded; /* touch: or bonded; with bonds only */
+  rve_near u[3];           /* relative velocity, if RVE_CARRIES */
   RveNearBody other;
   rve_near d[2], inverse, n[3], overlap, opening, slide[3], trial[3]; /* d, the branch, and 1/|d|: 2D */
 } RveRow;
@@ -121,14 +126,13 @@ typedef struct RveRow {
 RVE_FN int rve_meet(RveFeatures ft, const RveContactPass *c, const RveArrays *a, const RveNearBody *own,
                     const RveNearBody *other, int lane0, RveRow *row) {
   rve_near d[3];
-  const near_image image = near_load_image(a->image, lane0); /* wide: nobody reads it */
-  near_branch(ft.dimension, ft.wide, c->h, own->s, other->s, image, d);
+  near_find_branch(ft, &c->carry, c->h, a, own, other, lane0, row->u, d);
   const rve_near square = near_dot(ft.dimension, d, d), inverse = near_inverse_sqrt(square);
   const rve_near overlap = own->r + other->r - square * inverse;
   near_mask touch = near_less(near_set(0.0), overlap);
   row->lane0 = lane0;
   if (ft.bonds) {
-    row->image = image;
+    const near_image image = row->image = near_load_image(a->image, lane0);
     row->bonded = near_image_any(image, RVE_IMAGE_BOND);
     row->touch = touch = near_or(touch, row->bonded);
   }
@@ -177,7 +181,8 @@ RVE_FN void rve_slide(RveFeatures ft, const RveContactPass *c, const RveArrays *
   if (ft.viscous) row->other.m = other.m;
   for (int k = 0; k < dim; k++) {
     const int all = k > 0 || ft.viscous; /* else c->rate[0] = 0 */
-    u[k] = other.v[k] - own->v[k];
+    if (RVE_CARRIES) u[k] = row->u[k];
+    else u[k] = other.v[k] - own->v[k];
     if (dim == 2 && all) u[k] = u[k] + c->rate[3 * k] * row->d[0];
     if (dim == 2) u[k] = u[k] + c->rate[3 * k + 1] * row->d[1];
     else if (all) u[k] = u[k] + (lever + other_lever) * near_dot(3, c->rate + 3 * k, n); /* keeping d, too, takes longer */
@@ -368,8 +373,10 @@ RVE_FN void rve_fetch_ahead(RveScratch *s) {
 #endif
 }
 
-RVE_FN void rve_contact_blocks(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
-                               const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
+/* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
+ */
+RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
+                             const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
   const RveContactPass c = rve_contact_pass_of(ft, call, head, dt);
   const int chunks = RVE_CHUNK > 1 && ft.dimension == 3;
   RveContactSums sum;
@@ -389,19 +396,6 @@ RVE_FN void rve_contact_blocks(RveFeatures ft, const RveTeam *team, const RveCal
   }
   *slip = *slip + near_sum_wide(sum.slid);
   *loss = *loss + near_sum_wide(sum.lost);
-}
-
-/* All contacts. dt = 0: forces of the present state, histories do not grow. slip: J times kt; loss: W of the dashpots.
- */
-RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall *call, const RveHead *head, double dt,
-                             const RveCounts *n, const RveArrays *a, RveScratch *s, rve_real *slip, rve_real *loss) {
-  if (rve_may_be_wide(ft.dimension) && !ft.bonds && head->wide) { /* bonds need the images' word anyway */
-    ft.wide = 1;
-    rve_contact_blocks(ft, team, call, head, dt, n, a, s, slip, loss);
-    return;
-  }
-  ft.wide = 0;
-  rve_contact_blocks(ft, team, call, head, dt, n, a, s, slip, loss);
 }
 
 /* ------------------------------------------------------------------------------------------------------ move pass */

@@ -61,7 +61,7 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real 
   const rve_int image = rve_load_short(a->image, lane0);
   const rve_real zero = rve_set(0.0), one = rve_set(1.0);
   rve_real d[3], n[3], f[3];
-  rve_branch(dim, 0, h, own->s, other.s, image, d);
+  rve_branch(dim, h, own->s, other.s, image, d);
   const rve_real length = rve_sqrt(rve_dot(dim, d, d)), overlap = own->r + other.r - length;
   const rve_mask bonded = rve_int_any_bit(image, rve_set_int(RVE_IMAGE_BOND));
   const rve_mask touch = rve_or(rve_less(zero, overlap), bonded);
@@ -192,7 +192,7 @@ RVE_FN int rve_answer_is_finite(const RveAnswer *x) {
 /* Measures and answers. A state that is not finite leaves *answer as it was, but for its status, and fails the RVE. */
 RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call, RveHead *head, const RveCounts *n,
                         const RveArrays *a, double work_before, double duration, RveAnswer *answer) {
-  const RveFeatures all = {ft.dimension, ft.tangential, 1, ft.bonds, 0}; /* velocities are needed below */
+  const RveFeatures all = {ft.dimension, ft.tangential, 1, ft.bonds}; /* velocities are needed below */
   const int flew = head->flew;
   rve_real h[9];
   for (int k = 0; k < 9; k++) h[k] = rve_set(head->cell[k] * RVE_UNIT);

@@ -361,47 +361,6 @@ RVE_FN int rve_attach_saved(const RveCounts *n, RveScratch *s, int pairs, int sa
   return pairs;
 }
 
-/* ------------------------------------------------------------------------------------------------------- wide cells */
-
-/* 1 if no listed pair's fractional branch reaches half a cell edge while the list holds. Pairs outside must move by the
- * skin to touch, which is when the list is spent; the flow leaves fractions as they are. */
-RVE_FN int rve_is_wide(const RveHead *head, int dimension) {
-  const double longest = (2.0 * head->radius_max * head->scale_at_list + 2.0 * head->skin) * (1.0 + 1e-9);
-  int wide = rve_may_be_wide(dimension);
-  for (int k = 0; k < dimension; k++) wide &= longest * rve_row_norm(head->inverse, k) < 0.499;
-  return wide;
-}
-
-/* A grain that grain i cannot touch while the list holds, by a large grain's radius at the list's time; -1 if there is none. */
-RVE_FN int rve_stranger(const RveHead *head, const RveCounts *n, const RveArrays *a, int i) {
-  const double widest = 3.0 * head->radius_max * head->scale_at_list + head->skin;
-  for (int c = 0; c < n->grains; c++) {
-    const int j = (i + n->grains / 2 + c) % n->grains;
-    double square = 0.0, x[3] = {0.0, 0.0, 0.0};
-    for (int k = 0; k < n->dimension; k++)
-      x[k] = (double)(int64_t)(((uint64_t)a->position[k][j] - (uint64_t)a->position[k][i]) << 4) * (RVE_UNIT / 16.0);
-    for (int k = 0; k < n->dimension; k++) {
-      const double d = head->cell[3 * k] * x[0] + head->cell[3 * k + 1] * x[1] + head->cell[3 * k + 2] * x[2];
-      square += d * d;
-    }
-    if (square > widest * widest) return j;
-  }
-  return -1;
-}
-
-/* Without images an empty slot cannot lie cells away: it names a grain that is not near. Returns 0 if some grain has none. */
-RVE_FN int rve_name_strangers(const RveHead *head, const RveCounts *n, const RveArrays *a) {
-  const int stride = n->row ? n->row : 1;
-  for (int block = 0; block < n->blocks; block++)
-    for (int slot = a->slot_first[block] * RVE_PACK; slot < a->slot_first[block + 1] * RVE_PACK; slot++) {
-      if (!(a->image[slot] & RVE_IMAGE_VOID)) continue;
-      const int j = rve_stranger(head, n, a, block * RVE_PACK + slot % RVE_PACK);
-      if (j < 0) return 0;
-      a->neighbour[slot] = (uint32_t)(j * stride);
-    }
-  return 1;
-}
-
 enum { RVE_LIST_BUILT, RVE_LIST_TOO_SMALL, RVE_LIST_FAILED };
 
 /* The width of the shell of neighbours: fixed, or halved and doubled until lists last some hundred steps. */
@@ -441,13 +400,13 @@ RVE_PART int rve_build_list(const RveCall *call, RveHead *head, const RveCounts 
   }
   rve_reorder(n, a, s);
   rve_fill_slots(n, a, s, pairs);
-  head->wide = call->resting && rve_is_wide(head, n->dimension) && rve_name_strangers(head, n, a);
   for (int k = 0; k < 9; k++) head->cell_at_list[k] = head->cell[k];
   head->reach = 0.0;
   head->approach = call->resting ? 0.0 : 1e300; /* later than any row rests */
   head->stretch = 1.0;
   head->rebuilds++;
   head->steps_at_list = head->steps;
+  head->carried = 0;
   head->list_due = RVE_LIST_GOOD;
   head->need_pairs = head->need_slot_rows = head->need_incoming_rows = 0;
   return RVE_LIST_BUILT;

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Rows of four fields of a grain or a slot (array of structures), transposed into lanes and back; CUDA reads and writes
- * arrays instead.
+ * arrays instead, and so does plain code with grains.
  *
- * Loading rows and transposing them is faster than gathers where four fields are wanted. On an Intel processor with
- * AVX512-FP16 fields are gathered about as fast (RVE_GATHERS): there are no rows in 2D, in 3D they hold eight fields. */
+ * Loading rows and transposing them is faster than gathers where four fields are wanted, and they lie in one line of the cache. */
 #ifndef DEMPM_RVE_ROWS_H
 #define DEMPM_RVE_ROWS_H
 
@@ -23,12 +22,10 @@ typedef struct RveTwo {
 #endif
 
 /* RveCounts.row of these kernels. */
-#if defined(RVE_GATHERS)
-RVE_FN int rve_row_doubles(int dimension) { return dimension == 3 ? 8 : 0; }
-#elif defined(RVE_MIXED)
+#if RVE_CARRIES || defined(RVE_MIXED)
 RVE_FN int rve_row_doubles(int dimension) { return 4 * (dimension - 1); }
 #else
-RVE_FN int rve_row_doubles(int dimension) { return RVE_ROWS * 4 * dimension; }
+RVE_FN int rve_row_doubles(int dimension) { return 0 * dimension; }
 #endif
 
 typedef struct RveQuad {
@@ -131,24 +128,15 @@ RVE_FN void rve_transpose_back(RveQuad q, RveFour row[1]) {
 }
 #endif
 
-/* Four fields of the grains (or slots) that `offset` names, one per lane. rows: array of structures, offsets count
- * doubles; field: the same as four arrays, for teams without rows (NULL entries are read as 0). */
-RVE_FN RveQuad rve_gather(const double *rows, const double *const field[4], const uint32_t *offset, int lane0) {
-#if defined(__CUDACC__)
-  RveQuad q;
-  const uint32_t at = offset[lane0 + RVE_LANE];
-  (void)rows;
-#pragma unroll
-  for (int k = 0; k < 4; k++) q.f[k] = field[k] ? field[k][at] : 0.0;
-  return q;
-#else
+#if !defined(__CUDACC__)
+/* Four fields of the grains that `offset` names, in doubles, one per lane. */
+RVE_FN RveQuad rve_gather(const double *rows, const uint32_t *offset, int lane0) {
   RveFour row[RVE_SPAN];
-  (void)field;
   offset += lane0;
   for (int l = 0; l < RVE_SPAN; l++) row[l] = rve_four(rows + offset[l]);
   return rve_transpose(row);
-#endif
 }
+#endif
 
 /* Writes four fields of RVE_PACK consecutive rows of `stride` doubles (or into four arrays). */
 RVE_FN void rve_scatter(double *rows, int stride, double *const field[4], int lane0, RveQuad q) {
@@ -233,19 +221,29 @@ RVE_FN void rve_unpair(const RveTwo pair[RVE_SPAN], rve_real sum[2]) {
 }
 #endif
 
-#if defined(RVE_GATHERS)
-/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by themselves, or by where their rows of
- * eight doubles begin. */
+/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by themselves (row 0), or by where their rows
+ * of `row` doubles begin. */
 RVE_FN rve_real rve_pick(const double *field, const uint32_t *neighbour, int lane0, int row) {
+#if defined(RVE_ISA_AVX512)
   const __m256i at = _mm256_load_si256((const __m256i *)(const void *)(neighbour + lane0));
   rve_real from = rve_set(0.0);
   rve_mask all = 0xff;
   /* All lanes are overwritten, but the processor waits for what they were: gcc 12 would take any register, last used for the row before. */
   __asm__("" : "+v"(from));
   __asm__("" : "+k"(all));
-  return row == 8 ? _mm512_mask_i32gather_pd(from, all, at, field, 1) : _mm512_mask_i32gather_pd(from, all, at, field, 8);
+  return row == 8 ? _mm512_mask_i32gather_pd(from, all, at, field, 1) : _mm512_mask_i32gather_pd(from, all, at, field, 2);
+#elif defined(RVE_ISA_AVX2)
+  const __m128i at = _mm_load_si128((const __m128i *)(const void *)(neighbour + lane0));
+  const rve_real from = rve_set(0.0), all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
+  return row == 8 ? _mm256_mask_i32gather_pd(from, field, at, all, 1) : _mm256_mask_i32gather_pd(from, field, at, all, 2);
+#else
+  rve_real a;
+  memcpy(&a, field + neighbour[lane0 + RVE_LANE] / (uint32_t)(row > 0 ? row : 1), sizeof a);
+  return a;
+#endif
 }
 
+#if defined(RVE_WHOLE_REACTIONS)
 /* Two fields of eight consecutive rows of `stride` doubles. */
 RVE_FN void rve_scatter_two(double *rows, int stride, int lane0, rve_real a, rve_real b) {
   const rve_real even = _mm512_unpacklo_pd(a, b), odd = _mm512_unpackhi_pd(a, b);
@@ -269,22 +267,6 @@ RVE_FN void rve_transpose_six(const rve_real row[8], rve_real field[6]) {
   field[5] = rve_even_quarters(_mm512_unpackhi_pd(two[0], two[1]), _mm512_unpackhi_pd(two[2], two[3]));
 }
 #endif
-
-/* Two fields of the grains that `offset` names: rve_gather() with fewer shuffles. */
-RVE_FN void rve_gather_pair(const double *rows, const double *const field[2], const uint32_t *offset, int lane0,
-                            rve_real two[2]) {
-#if defined(__CUDACC__)
-  const uint32_t at = offset[lane0 + RVE_LANE];
-  (void)rows;
-  two[0] = field[0][at], two[1] = field[1][at];
-#else
-  RveTwo pair[RVE_SPAN];
-  (void)field;
-  offset += lane0;
-  for (int l = 0; l < RVE_SPAN; l++) pair[l] = rve_two(rows + offset[l]);
-  rve_unpair(pair, two);
-#endif
-}
 
 #endif /* RVE_KERNEL */
 #endif

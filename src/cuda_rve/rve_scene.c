@@ -125,7 +125,7 @@ uint64_t rve_scene_hash(const RveScene *scene) {
 }
 
 RveFeatures rve_scene_features(const RveScene *scene) {
-  RveFeatures features = {scene->dimension, scene->tangential_stiffness > 0.0, 0, scene->bonds, 0};
+  RveFeatures features = {scene->dimension, scene->tangential_stiffness > 0.0, 0, scene->bonds};
   features.viscous =
       scene->normal_viscosity > 0.0 || scene->tangential_viscosity > 0.0 || scene->critical_damping > 0.0;
   return features;

@@ -8,7 +8,7 @@
  * The list. Grains are sorted by degree and dealt in blocks of `lanes`; grain i of block b owns the slots (row, i mod
  * lanes) of the rows slot_first[b] .. slot_first[b+1]. Each contact has exactly one slot, at the grain that "owns" it
  * (degrees are balanced); the other grain finds it in its incoming list. A slot without contact names its own grain,
- * many cells away, or in wide cells (RveHead.wide), whose images nobody reads, one that is not near.
+ * many cells away.
  *
  * Pairs that touch or nearly do come first in a block's rows, the others have rows of their own. A row of which no pair
  * touches rests until its nearest pair may: idle_until says when, on the clock of RveHead.approach. */
@@ -58,7 +58,7 @@ typedef struct RveHead {
   int32_t bonds_installed;
   int32_t need_slot_rows, need_incoming_rows, need_pairs; /* set when an arena is too small */
   int16_t apart;    /* no grains touch, no bond holds and no force is left: the next call may be a free flight */
-  int16_t wide;     /* each pair of the list is that of nearest images while the list holds, see rve_is_wide() */
+  int16_t carried;  /* RveArrays.branch is that of the last contact pass; 0: positions have to give it */
   int32_t flew;     /* the last call was one */
   double approach;   /* m: no gap between two grains has shrunk by more since the list was built; never falls */
 } RveHead;
@@ -76,6 +76,7 @@ typedef struct RveArrays {
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist); one row more than the list has */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
+  double *branch[3];   /* [slot] x_j - x_i, m, if rve_carries(); of rows in which something touched or that were looked at last */
   double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_reaction_at() of the slot: a plane of four
                           numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z), or both together (RVE_WHOLE); the
                           last slots stay zero */
@@ -113,7 +114,6 @@ typedef struct RveCall {
 /* Which parts of the kernel a scene needs; constants in the stamped-out variants. */
 typedef struct RveFeatures {
   int dimension, tangential, viscous, bonds;
-  int wide; /* RveHead.wide: only contact passes look */
 } RveFeatures;
 
 /* Working memory of a list's construction, for n grains and `pairs` candidate pairs. */
@@ -141,6 +141,9 @@ RVE_ANY void *rve_carve(void *base, size_t *used, size_t bytes) {
   return at;
 }
 
+/* 1 if kernels of these counts carry branches along: FP64 on CPUs. (Rows were longer before they did.) */
+RVE_ANY int rve_carries(const RveCounts *n) { return n->reaction >= 4 && n->row == 4 * (n->dimension - 1); }
+
 /* Doubles of a slot in the first plane of reactions; half as many in the second, if there is one. */
 RVE_ANY int rve_reaction_width(const RveCounts *n) {
   return n->dimension == 2 || n->reaction == RVE_WHOLE ? n->reaction : n->reaction / 3 * 2;
@@ -166,6 +169,7 @@ RVE_ANY size_t rve_layout(const RveCounts *n, void *base, RveArrays *a) {
     a->spin[k] = (double *)rve_carve(base, &used, has_spin ? grains * 8 : 0);
     a->torque[k] = (double *)rve_carve(base, &used, has_spin ? grains * 8 : 0);
     a->shear[k] = (double *)rve_carve(base, &used, has_spin ? slots * 8 : 0);
+    a->branch[k] = (double *)rve_carve(base, &used, in_plane && rve_carries(n) ? slots * 8 : 0);
   }
   for (int k = 0; k < 5; k++) *per_grain[k] = (double *)rve_carve(base, &used, grains * 8);
   a->id = (int32_t *)rve_carve(base, &used, grains * 4);

@@ -116,6 +116,7 @@ RVE_FN RveOutcome rve_run(RveFeatures ft, const RveTeam *team, const RveCall *ca
     else if (head->list_due) outcome = rve_renew_list(ft, team, call, head, n, a, s);
     if (outcome != RVE_DONE) break;
     rve_contact_pass(ft, team, call, head, dt, n, a, s, &slip, &dash);
+    if (RVE_CARRIES) head->carried = 1;
     rve_sync();
   }
   const double kt = call->tangential_stiffness;

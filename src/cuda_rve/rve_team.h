@@ -5,8 +5,8 @@
  * team is one thread; in CUDA it is one number per thread, a span is a warp and a team is a thread block. Lists are
  * laid out for packs of RVE_PACK grains: a span, or RVE_PARTS of them in mixed precision (rve_near.h).
  *
- * Most CPUs also keep what a neighbour must know of a grain in one row (array of structures), see rve_rows.h. CUDA reads the
- * arrays themselves. */
+ * SIMD kernels also keep what a neighbour must know of a grain in one row (array of structures), see rve_rows.h. CUDA and plain
+ * code read the arrays themselves. */
 #ifndef DEMPM_RVE_TEAM_H
 #define DEMPM_RVE_TEAM_H
 
@@ -54,7 +54,7 @@ RVE_ANY int rve_place(int pack, int slot) {
  * lane */
 #if defined(RVE_ISA_AVX512)
 
-enum { RVE_SPAN = 8, RVE_ROWS = 1 };
+enum { RVE_SPAN = 8 };
 typedef __m512d rve_real;
 typedef __m512i rve_int; /* int64 */
 typedef __mmask8 rve_mask;
@@ -105,7 +105,7 @@ RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm512_maskz_mov_pd(m,
 
 #elif defined(RVE_ISA_AVX2)
 
-enum { RVE_SPAN = 4, RVE_ROWS = 1 };
+enum { RVE_SPAN = 4 };
 typedef __m256d rve_real;
 typedef __m256i rve_int;
 typedef __m256d rve_mask; /* all bits of a lane set, or none */
@@ -181,10 +181,10 @@ RVE_FN rve_real rve_keep(rve_mask m, rve_real a) { return _mm256_and_pd(m, a); }
 #else /* one lane: plain C, or one CUDA thread */
 
 #if defined(__CUDACC__)
-enum { RVE_SPAN = 32, RVE_ROWS = 0 };
+enum { RVE_SPAN = 32 };
 #define RVE_LANE ((int)(threadIdx.x & 31u))
 #else
-enum { RVE_SPAN = 1, RVE_ROWS = 1 };
+enum { RVE_SPAN = 1 };
 #define RVE_LANE 0
 #endif
 typedef double rve_real;
@@ -264,7 +264,7 @@ enum { RVE_PACK = RVE_PARTS * RVE_SPAN };
 /* Doubles from one slot to the next in RveArrays.incoming, 3D. */
 #if defined(__CUDACC__)
 enum { RVE_REACTION = 1 };
-#elif defined(RVE_GATHERS)
+#elif defined(RVE_WHOLE_REACTIONS)
 enum { RVE_REACTION = RVE_WHOLE };
 #else
 enum { RVE_REACTION = 4 / RVE_PARTS };
@@ -277,17 +277,18 @@ enum { RVE_CHUNK = 1, RVE_AHEAD = 0 };
 enum { RVE_CHUNK = 4, RVE_AHEAD = 1 /* see RveRows */ };
 #endif
 /* Spans whose reactions are summed before they move, 2D. */
-#if defined(RVE_GATHERS)
+#if defined(RVE_WHOLE_REACTIONS)
 enum { RVE_SUM_AHEAD = 1 };
 #else
 enum { RVE_SUM_AHEAD = RVE_CHUNK };
 #endif
-/* 1 where lists of wide cells (RveHead.wide) are worth a form of the contact pass of their own: not in 3D on a Zen 4. */
-#if defined(RVE_GATHERS)
-RVE_FN int rve_may_be_wide(int dimension) { return dimension >= 2; }
+/* 1 where branches are carried along from step to step, see near_find_branch(), and positions give them anew every RVE_FRESH steps. */
+#if (defined(RVE_ISA_AVX512) || defined(RVE_ISA_AVX2)) && !defined(RVE_MIXED)
+#define RVE_CARRIES 1
 #else
-RVE_FN int rve_may_be_wide(int dimension) { return RVE_ROWS && dimension == 2; }
+#define RVE_CARRIES 0
 #endif
+enum { RVE_FRESH = 64 };
 
 /* 1/sqrt(a) to round-off. */
 #if defined(RVE_ISA_AVX512)

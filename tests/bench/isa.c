@@ -16,7 +16,7 @@
 
 static int only_2d(const RveCall *call, void *arena, const RveCounts *counts, RveScratch *scratch) {
   static const RveTeam alone = {0, 1, 1, 0};
-  const RveFeatures ft = {2, 1, 0, 0, 0};
+  const RveFeatures ft = {2, 1, 0, 0};
   RveCounts n = *counts;
   RveCall bare = *call;
   RveArrays a;
@@ -62,12 +62,11 @@ static double read_numbers(const double *numbers, long count, long sweeps) {
 }
 
 static double gather(const double *rows, const uint32_t *offset, long count, long sweeps) {
-  const double *const none[4] = {0, 0, 0, 0};
   rve_real a = rve_set(0.0), b = a, c = a, d = a;
   const double start = base_seconds();
   for (long s = 0; s < sweeps; s++)
     for (long i = 0; i < count; i += RVE_SPAN) {
-      const RveQuad q = rve_gather(rows, none, offset, (int)i);
+      const RveQuad q = rve_gather(rows, offset, (int)i);
       a = a + q.f[0], b = b + q.f[1], c = c + q.f[2], d = d + q.f[3];
       KEEP(a);
       KEEP(b);

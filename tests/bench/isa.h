@@ -19,7 +19,7 @@ typedef struct BenchIsa {
 
 extern const BenchIsa bench_isa_plain;
 #if defined(__x86_64__)
-extern const BenchIsa bench_isa_avx2, bench_isa_avx512, bench_isa_avx512_gather;
+extern const BenchIsa bench_isa_avx2, bench_isa_avx512, bench_isa_avx512_whole;
 #endif
 
 /* What belongs to the kernels that the library chooses. */
@@ -28,7 +28,7 @@ static inline const BenchIsa *bench_isa(const RveScene *scene, const RveKernels 
 #if defined(__x86_64__)
   if (*kernels == &rve_kernels_avx2) return &bench_isa_avx2;
   if (*kernels == &rve_kernels_avx512) return &bench_isa_avx512;
-  if (*kernels == &rve_kernels_avx512_gather) return &bench_isa_avx512_gather;
+  if (*kernels == &rve_kernels_avx512_whole) return &bench_isa_avx512_whole;
 #endif
   return &bench_isa_plain;
 }

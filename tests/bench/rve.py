@@ -29,10 +29,10 @@ GPU_WARPS = 16, 8, 4  # of a block, at most; the first is the default
 FEWEST_ROUNDS = 3  # of which a median can be taken, whatever the time
 TUNING_STEPS, TUNING_TRIES = 4000, 2  # the same for all codes
 # Floating-point operations and bytes moved per particle-step, a + b * slots; counted from the kernels' source in
-# doc/performance.md, and to be counted anew when they change. Kernels that gather keep shorter rows, or none.
-FLOP = {2: (55, 73), 3: (109, 163)}
-BYTES = {2: (264, 152), 3: (440, 250)}
-BYTES_GATHER = {2: (192, 136), 3: (400, 248)}
+# doc/performance.md, and to be counted anew when they change. Whole reactions are longer, in 3D.
+FLOP = {2: (55, 79), 3: (109, 172)}
+BYTES = {2: (216, 152), 3: (384, 264)}
+BYTES_WHOLE = {2: (216, 152), 3: (384, 280)}
 
 
 def text(*command):
@@ -191,7 +191,7 @@ class Bench:
         result = {"peak": peak}
         for dimension in (2, 3):
             slots, rate = skipping[f"{dimension}d"]["used_slots"], table.get(f"dempm_{dimension}d", {}).get("median", 0.0)
-            moving = BYTES_GATHER if peak["isa"] == "avx512_gather" else BYTES
+            moving = BYTES_WHOLE if peak["isa"] == "avx512_whole" else BYTES
             flop, moved = (a + b * slots for a, b in (FLOP[dimension], moving[dimension]))
             result[f"{dimension}d"] = {
                 "slots_per_grain": slots, "flop": flop, "bytes": moved, "gflops": 1e-9 * flop * rate,
