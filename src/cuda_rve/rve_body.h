@@ -399,61 +399,89 @@ RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) 
   return head->approach < until;
 }
 
-#if defined(RVE_WHOLE_REACTIONS)
-/* rve_sum_reactions() of whole reactions. */
-RVE_FN void rve_sum_whole(const RveHead *head, const RveArrays *a, int block, rve_real force[3], rve_real torque[3]) {
-  rve_real sum[8], field[6];
-  for (int l = 0; l < 8; l++) sum[l] = rve_set(0.0);
-  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
-    if (row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
-    const uint32_t *at = a->incoming + row * RVE_PACK;
-    for (int l = 0; l < 8; l++) sum[l] = sum[l] + rve_load(a->reaction + at[l], 0);
-  }
-  rve_transpose_six(sum, field);
-  for (int k = 0; k < 3; k++) force[k] = field[k], torque[k] = field[3 + k];
-}
-#endif
-
+#if defined(__CUDACC__)
 /* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. */
 RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0,
                               rve_real force[3], rve_real torque[3]) {
-  const int block = lane0 / RVE_PACK, part = lane0 % RVE_PACK;
-#if defined(__CUDACC__)
+  const int block = lane0 / RVE_PACK;
   for (int k = 0; k < 3; k++) force[k] = torque[k] = 0.0;
+  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
+    if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
+    const uint32_t at = a->incoming[row * RVE_PACK + RVE_LANE];
+    for (int k = 0; k < ft.dimension; k++) force[k] += a->reaction_field[k][at];
+    for (int k = 0; ft.tangential && k < rve_spins(ft); k++) torque[k] += a->reaction_field[ft.dimension + k][at];
+  }
+}
 #else
-  const double *const more = a->reaction_more;
-  const int second = ft.dimension == 3 && ft.tangential;
+
+/* What the slots of one row of the incoming list did to a span of grains: of each lane a reaction's first plane, its second, or the
+ * whole of it. */
+typedef struct RveIncoming {
+  RveFour four[RVE_SPAN];
+  RveTwo two[RVE_SPAN];
 #if defined(RVE_WHOLE_REACTIONS)
-  if (second) {
-    rve_sum_whole(head, a, block, force, torque);
+  rve_real whole[RVE_SPAN];
+#endif
+} RveIncoming;
+
+enum { RVE_FOUR = 1, RVE_TWO = 2, RVE_ALL = 4 }; /* which of them are wanted */
+
+RVE_FN void rve_read_incoming(const RveArrays *a, const uint32_t *at, int parts, RveIncoming *in) {
+  for (int l = 0; l < RVE_SPAN; l++) {
+    if (parts & RVE_FOUR) in->four[l] = near_four(a->reaction + at[l]);
+    if (parts & RVE_TWO) in->two[l] = near_two(a->reaction_more + at[l] / 2);
+#if defined(RVE_WHOLE_REACTIONS)
+    if (parts & RVE_ALL) in->whole[l] = rve_load(a->reaction + at[l], 0);
+#endif
+  }
+}
+RVE_FN void rve_add_incoming(const RveIncoming *in, int parts, RveIncoming *sum) {
+  for (int l = 0; l < RVE_SPAN; l++) {
+    if (parts & RVE_FOUR) sum->four[l] = rve_four_add(sum->four[l], in->four[l]);
+    if (parts & RVE_TWO) sum->two[l] = rve_two_add(sum->two[l], in->two[l]);
+#if defined(RVE_WHOLE_REACTIONS)
+    if (parts & RVE_ALL) sum->whole[l] = sum->whole[l] + in->whole[l];
+#endif
+  }
+}
+
+/* Transposes a sum. */
+RVE_FN void rve_split_incoming(int dim, const RveIncoming *sum, int parts, rve_real force[3], rve_real torque[3]) {
+#if defined(RVE_WHOLE_REACTIONS)
+  if (parts & RVE_ALL) {
+    rve_real field[6];
+    rve_transpose_six(sum->whole, field);
+    for (int k = 0; k < 3; k++) force[k] = field[k], torque[k] = field[3 + k];
     return;
   }
 #endif
-  RveFour sum[RVE_SPAN];
-  RveTwo pair[RVE_SPAN];
-  for (int l = 0; l < RVE_SPAN; l++) sum[l] = rve_four_zero(), pair[l] = rve_two_zero();
-#endif
-  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
-    if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
-    const uint32_t *at = a->incoming + row * RVE_PACK + part;
-#if defined(__CUDACC__)
-    for (int k = 0; k < ft.dimension; k++) force[k] += a->reaction_field[k][at[RVE_LANE]];
-    for (int k = 0; ft.tangential && k < rve_spins(ft); k++)
-      torque[k] += a->reaction_field[ft.dimension + k][at[RVE_LANE]];
-#else
-    for (int l = 0; l < RVE_SPAN; l++) {
-      sum[l] = rve_four_add(sum[l], near_four(a->reaction + at[l]));
-      if (second) pair[l] = rve_two_add(pair[l], near_two(more + at[l] / 2));
-    }
-#endif
-  }
-#if !defined(__CUDACC__)
-  const RveQuad q = rve_transpose(sum);
-  force[0] = q.f[0], force[1] = q.f[1];
-  if (ft.dimension == 2) torque[0] = q.f[2];
-  else force[2] = q.f[2], torque[0] = q.f[3];
-  if (second) rve_unpair(pair, torque + 1);
-#endif
+  const RveQuad q = rve_transpose(sum->four);
+  for (int k = 0; k < dim; k++) force[k] = q.f[k];
+  torque[0] = q.f[dim];
+  if (parts & RVE_TWO) rve_unpair(sum->two, torque + 1);
 }
+
+/* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. The first row is
+ * taken as it is, whether it rests or not: each block has one, and what rests is 0. */
+RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0,
+                              rve_real force[3], rve_real torque[3]) {
+  const int block = lane0 / RVE_PACK, all = ft.dimension == 3 && ft.tangential, first = a->incoming_first[block];
+#if defined(RVE_WHOLE_REACTIONS)
+  const int parts = all ? RVE_ALL : RVE_FOUR;
+#else
+  const int parts = all ? RVE_FOUR | RVE_TWO : RVE_FOUR;
+#endif
+  const uint32_t *const at = a->incoming + lane0 % RVE_PACK;
+  RveIncoming sum;
+  rve_read_incoming(a, at + first * RVE_PACK, parts, &sum);
+  for (int row = first + 1; row < a->incoming_first[block + 1]; row++) {
+    RveIncoming more;
+    if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
+    rve_read_incoming(a, at + row * RVE_PACK, parts, &more);
+    rve_add_incoming(&more, parts, &sum);
+  }
+  rve_split_incoming(ft.dimension, &sum, parts, force, torque);
+}
+#endif
 
 #endif

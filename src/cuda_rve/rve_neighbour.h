@@ -259,6 +259,7 @@ RVE_FN void rve_rank(const RveCounts *n, RveScratch *s, int *slot_rows, int *inc
   *slot_rows = *incoming_rows = 0;
   for (int block = 0; block < n->blocks; block++) {
     s->out_rows[block] = rve_most(s, s->out, block), s->in_rows[block] = rve_most(s, s->in, block);
+    if (s->in_rows[block] == 0) s->in_rows[block] = 1; /* rve_sum_reactions() asks for one */
     *slot_rows += s->out_rows[block] + rve_most(s, s->out_far, block);
     *incoming_rows += s->in_rows[block] + rve_most(s, s->in_far, block);
   }
