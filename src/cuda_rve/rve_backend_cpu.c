@@ -19,14 +19,14 @@ static const RveTeam alone = {0, 1, 1, 0};
 /* Stamps out one variant: the features are constants in it. */
 #define VARIANT(name, tangential, viscous, bonds)                                                                      \
   static int run_##name(const RveCall *call, void *arena, const RveCounts *n, RveScratch *s) {                         \
-    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds};                                             \
+    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds};                                                \
     RveArrays a;                                                                                                       \
     rve_layout(n, arena, &a);                                                                                          \
     return (int)rve_run(ft, &alone, call, rve_head(arena), n, &a, s);                                                  \
   }                                                                                                                    \
   static void measure_##name(const RveCall *call, void *arena, const RveCounts *n, double work, double duration,       \
                              RveAnswer *answer) {                                                                      \
-    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds};                                             \
+    const RveFeatures ft = {RVE_DIMENSION, tangential, viscous, bonds};                                                \
     RveArrays a;                                                                                                       \
     rve_layout(n, arena, &a);                                                                                          \
     rve_measure(ft, &alone, call, rve_head(arena), n, &a, work, duration, answer);                                     \

@@ -76,7 +76,7 @@ typedef struct RveArrays {
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist); one row more than the list has */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
-  double *branch[3];   /* [slot] x_j - x_i, m, if rve_carries(); of rows in which something touched or that were looked at last */
+  double *branch[3];   /* [slot] x_j - x_i, m, if rve_carries(); of rows that did not rest in the last contact pass */
   double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_reaction_at() of the slot: a plane of four
                           numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z), or both together (RVE_WHOLE); the
                           last slots stay zero */

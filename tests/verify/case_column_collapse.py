@@ -9,6 +9,9 @@ LAW = dict(kn=1e6, kt=1e6, mu=0.5, density=2650, thickness=0.075, damping__local
 # name: (bond strength, case file). Without bonds the strength is not used.
 COLUMNS = {"bare": (0.1, "bare"), "0.01": (0.01, "frozen"), "0.02": (0.02, "frozen"), "0.02 melting": (0.02, "melting"), "0.1": (0.1, "frozen"),
            "0.1 melting": (0.1, "melting")}
+# Standard deviation of a ratio of peaks, means of three packings, among 48. At 50 kPa bonds of 0.01 raise the peak by less than 48
+# packings show (1.006 +- 0.020 and 0.978 +- 0.018), so that three can only tell that they do not lower it.
+SCATTER = 0.06
 ACCELERATION = {False: 25.0, True: 1.0}  # of the heat, by size_verify.inc
 
 
@@ -31,7 +34,8 @@ def strength(study):
             axis.plot(100 * strain, stress / 1e3, color=f"C{k}", label=rf"$\beta_b$ = {bond:g}")
         axis.set(title=f"{pressure / 1e3:g} kPa", xlabel="axial strain [%]", ylabel="axial stress [kPa]")
         rise = [b / a - 1 for a, b in zip(peaks, peaks[1:])]
-        study.check(f"strength at {pressure / 1e3:g} kPa: peak without bonds over that with 0.01", 1 / (1 + rise[0]), 1.0, NO_RUN)
+        study.check(f"strength at {pressure / 1e3:g} kPa: peak without bonds over that with 0.01", 1 / (1 + rise[0]),
+                    1.0 + (2 * SCATTER if pressure == 5e4 else 0.0), NO_RUN)
         study.check(f"strength at {pressure / 1e3:g} kPa: peak with 0.01 over that with 0.02", 1 / (1 + rise[1]), 1.0, NO_RUN)
         study.note(f"{pressure / 1e3:g} kPa: peaks {', '.join(f'{peak / 1e3:.1f}' for peak in peaks)} kPa (mean of {seeds} packings of {grains})")
     axes[0].legend(frameon=False)
