@@ -157,6 +157,7 @@ RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_re
   for (int k = 0; k < dim; k++) u[k] = other->v[k] - own->v[k];
   if (__builtin_expect(carry->fresh || rested, 0)) {
     RveBody i, j;
+    /* Read again: own->s, kept for this seldom use, would take room from what each row wants (4 % in 2D). */
     for (int k = 0; k < dim; k++) i.s[k] = rve_load_int(a->position[k], own->lane0);
     rve_neighbour_position(dim, a, lane0, &j);
     rve_branch(dim, h, i.s, j.s, rve_load_short(a->image, lane0), d);
@@ -399,34 +400,47 @@ RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) 
   return head->approach < until;
 }
 
-#if defined(__CUDACC__)
-/* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. */
-RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0,
-                              rve_real force[3], rve_real torque[3]) {
-  const int block = lane0 / RVE_PACK;
-  for (int k = 0; k < 3; k++) force[k] = torque[k] = 0.0;
-  for (int row = a->incoming_first[block]; row < a->incoming_first[block + 1]; row++) {
-    if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
-    const uint32_t at = a->incoming[row * RVE_PACK + RVE_LANE];
-    for (int k = 0; k < ft.dimension; k++) force[k] += a->reaction_field[k][at];
-    for (int k = 0; ft.tangential && k < rve_spins(ft); k++) torque[k] += a->reaction_field[ft.dimension + k][at];
-  }
-}
-#else
-
-/* What the slots of one row of the incoming list did to a span of grains: of each lane a reaction's first plane, its second, or the
- * whole of it. */
+/* What the slots of one row of the incoming list did to a span of grains. CPUs keep it as it is stored, of each lane a reaction's first
+ * plane, its second, or the whole of it; a sum is transposed once. */
 typedef struct RveIncoming {
+#if defined(__CUDACC__)
+  rve_real force[3], torque[3];
+#else
   RveFour four[RVE_SPAN];
   RveTwo two[RVE_SPAN];
+#endif
 #if defined(RVE_WHOLE_REACTIONS)
   rve_real whole[RVE_SPAN];
 #endif
 } RveIncoming;
 
-enum { RVE_FOUR = 1, RVE_TWO = 2, RVE_ALL = 4 }; /* which of them are wanted */
+#if defined(__CUDACC__)
+RVE_FN void rve_read_incoming(RveFeatures ft, const RveArrays *a, const uint32_t *at, RveIncoming *in) {
+  for (int k = 0; k < ft.dimension; k++) in->force[k] = a->reaction_field[k][at[RVE_LANE]];
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) in->torque[k] = a->reaction_field[ft.dimension + k][at[RVE_LANE]];
+}
+RVE_FN void rve_add_incoming(RveFeatures ft, const RveIncoming *in, RveIncoming *sum) {
+  for (int k = 0; k < ft.dimension; k++) sum->force[k] += in->force[k];
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) sum->torque[k] += in->torque[k];
+}
+RVE_FN void rve_split_incoming(RveFeatures ft, const RveIncoming *sum, rve_real force[3], rve_real torque[3]) {
+  for (int k = 0; k < ft.dimension; k++) force[k] = sum->force[k];
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) torque[k] = sum->torque[k];
+}
+#else
 
-RVE_FN void rve_read_incoming(const RveArrays *a, const uint32_t *at, int parts, RveIncoming *in) {
+enum { RVE_FOUR = 1, RVE_TWO = 2, RVE_ALL = 4 }; /* parts of RveIncoming */
+
+RVE_FN int rve_incoming_parts(RveFeatures ft) {
+  if (ft.dimension == 2 || !ft.tangential) return RVE_FOUR;
+#if defined(RVE_WHOLE_REACTIONS)
+  return RVE_ALL;
+#else
+  return RVE_FOUR | RVE_TWO;
+#endif
+}
+RVE_FN void rve_read_incoming(RveFeatures ft, const RveArrays *a, const uint32_t *at, RveIncoming *in) {
+  const int parts = rve_incoming_parts(ft);
   for (int l = 0; l < RVE_SPAN; l++) {
     if (parts & RVE_FOUR) in->four[l] = near_four(a->reaction + at[l]);
     if (parts & RVE_TWO) in->two[l] = near_two(a->reaction_more + at[l] / 2);
@@ -435,7 +449,8 @@ RVE_FN void rve_read_incoming(const RveArrays *a, const uint32_t *at, int parts,
 #endif
   }
 }
-RVE_FN void rve_add_incoming(const RveIncoming *in, int parts, RveIncoming *sum) {
+RVE_FN void rve_add_incoming(RveFeatures ft, const RveIncoming *in, RveIncoming *sum) {
+  const int parts = rve_incoming_parts(ft);
   for (int l = 0; l < RVE_SPAN; l++) {
     if (parts & RVE_FOUR) sum->four[l] = rve_four_add(sum->four[l], in->four[l]);
     if (parts & RVE_TWO) sum->two[l] = rve_two_add(sum->two[l], in->two[l]);
@@ -444,9 +459,8 @@ RVE_FN void rve_add_incoming(const RveIncoming *in, int parts, RveIncoming *sum)
 #endif
   }
 }
-
-/* Transposes a sum. */
-RVE_FN void rve_split_incoming(int dim, const RveIncoming *sum, int parts, rve_real force[3], rve_real torque[3]) {
+RVE_FN void rve_split_incoming(RveFeatures ft, const RveIncoming *sum, rve_real force[3], rve_real torque[3]) {
+  const int parts = rve_incoming_parts(ft);
 #if defined(RVE_WHOLE_REACTIONS)
   if (parts & RVE_ALL) {
     rve_real field[6];
@@ -456,32 +470,27 @@ RVE_FN void rve_split_incoming(int dim, const RveIncoming *sum, int parts, rve_r
   }
 #endif
   const RveQuad q = rve_transpose(sum->four);
-  for (int k = 0; k < dim; k++) force[k] = q.f[k];
-  torque[0] = q.f[dim];
+  for (int k = 0; k < ft.dimension; k++) force[k] = q.f[k];
+  torque[0] = q.f[ft.dimension];
   if (parts & RVE_TWO) rve_unpair(sum->two, torque + 1);
 }
+#endif
 
 /* Force and torque that a span of grains gets from the slots of others, summed in the order of the incoming list. The first row is
  * taken as it is, whether it rests or not: each block has one, and what rests is 0. */
 RVE_FN void rve_sum_reactions(RveFeatures ft, const RveHead *head, const RveArrays *a, int lane0,
                               rve_real force[3], rve_real torque[3]) {
-  const int block = lane0 / RVE_PACK, all = ft.dimension == 3 && ft.tangential, first = a->incoming_first[block];
-#if defined(RVE_WHOLE_REACTIONS)
-  const int parts = all ? RVE_ALL : RVE_FOUR;
-#else
-  const int parts = all ? RVE_FOUR | RVE_TWO : RVE_FOUR;
-#endif
+  const int block = lane0 / RVE_PACK, first = a->incoming_first[block];
   const uint32_t *const at = a->incoming + lane0 % RVE_PACK;
   RveIncoming sum;
-  rve_read_incoming(a, at + first * RVE_PACK, parts, &sum);
+  rve_read_incoming(ft, a, at + first * RVE_PACK, &sum);
   for (int row = first + 1; row < a->incoming_first[block + 1]; row++) {
     RveIncoming more;
     if (ft.dimension == 3 && row >= a->incoming_far[block] && rve_incoming_rests(head, a, row)) continue;
-    rve_read_incoming(a, at + row * RVE_PACK, parts, &more);
-    rve_add_incoming(&more, parts, &sum);
+    rve_read_incoming(ft, a, at + row * RVE_PACK, &more);
+    rve_add_incoming(ft, &more, &sum);
   }
-  rve_split_incoming(ft.dimension, &sum, parts, force, torque);
+  rve_split_incoming(ft, &sum, force, torque);
 }
-#endif
 
 #endif

@@ -25,7 +25,10 @@ typedef struct RveTwo {
 #if RVE_CARRIES || defined(RVE_MIXED)
 RVE_FN int rve_row_doubles(int dimension) { return 4 * (dimension - 1); }
 #else
-RVE_FN int rve_row_doubles(int dimension) { return 0 * dimension; }
+RVE_FN int rve_row_doubles(int dimension) {
+  (void)dimension;
+  return 0;
+}
 #endif
 
 typedef struct RveQuad {
@@ -221,8 +224,8 @@ RVE_FN void rve_unpair(const RveTwo pair[RVE_SPAN], rve_real sum[2]) {
 }
 #endif
 
-/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by themselves (row 0), or by where their rows
- * of `row` doubles begin. */
+/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by where their rows of `row` doubles begin (4 or
+ * 8), or without rows, CUDA and plain code, by themselves (0). */
 RVE_FN rve_real rve_pick(const double *field, const uint32_t *neighbour, int lane0, int row) {
 #if defined(RVE_ISA_AVX512)
   const __m256i at = _mm256_load_si256((const __m256i *)(const void *)(neighbour + lane0));

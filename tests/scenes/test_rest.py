@@ -72,7 +72,7 @@ def test_a_settled_column_costs_a_tenth_and_stands_as_before(dempm, grains, tmp_
 def test_a_collapse_is_the_same_with_rest(dempm, grains, tmp_path):
     """Once the column flows its packings are run again. The first 0.05 s agree; later any two collapses drift apart, as grains take
     other turns: the last digits of gravity move the frictional heat by 4 % (standard deviation). So it is the means of eight collapses
-    that must agree, within three standard errors of their difference. Free flights, whose round-off does the same, are off."""
+    that must agree; 5 % are 2.8 standard errors of their difference. Free flights, whose round-off does the same, are off."""
     stepped = lambda text: text.replace(" rest ", " flight no rest ", 1)
     files, collapse = [grains], "unfix right\nrun 2000\n"
     dempm(stepped(scene("no", "run 3000\nwrite_restart half\n")), files=files, cwd=tmp_path, timeout=300)
@@ -87,9 +87,7 @@ def test_a_collapse_is_the_same_with_rest(dempm, grains, tmp_path):
     assert largest > 10.0
     assert np.abs(kinetic["1e-3"] - kinetic["no"])[:, :6].max() < 0.005 * largest
     assert np.abs(kinetic["1e-3"].mean(axis=0) - kinetic["no"].mean(axis=0)).max() < 0.1 * largest  # 0.03 to 0.06 with four kernels
-    error = np.sqrt(sum(heat[rest].var(ddof=1) / 8 for rest in heat))
-    assert error < 0.04 * heat["no"].mean()
-    assert abs(heat["1e-3"].mean() - heat["no"].mean()) < 3 * error
+    assert heat["1e-3"].mean() == pytest.approx(heat["no"].mean(), rel=0.05)
 
 
 def test_rest_is_reproduced_by_ranks_and_restart(dempm, grains, tmp_path):
