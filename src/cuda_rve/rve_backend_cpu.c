@@ -53,7 +53,7 @@ static void measure(RveFeatures ft, const RveCall *call, void *arena, const RveC
 
 /* rve_row_doubles(), and the same of reactions. */
 #if defined(RVE_MIXED)
-#define ROWS {4, 8}, {2, 3}
+#define ROWS {2, 4}, {2, 3}
 #elif defined(RVE_WHOLE_REACTIONS)
 #define ROWS {4, 8}, {4, RVE_WHOLE}
 #elif RVE_CARRIES

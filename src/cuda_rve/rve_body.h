@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Grains as their neighbours see them, branches, and the reactions that contacts leave for the other grain: how they are
- * stored, read and summed. Two forms: as FP64, and as pairs of FP32 for mixed precision (rve_near.h), whose rows are half
- * as long: 2D s_x s_y (v_x v_y) (w r); 3D s_x s_y s_z (r m) | (v_x v_y) (v_z w_x) (w_y w_z) 0. */
+ * stored, read and summed. Two forms: FP64, and FP32 for mixed precision (rve_near.h). CPUs keep what neighbours want of a
+ * grain in one row: 2D v w r, 3D v r | w m. Positions are seldom wanted, and masses in 2D: these come from the arrays. */
 #ifndef DEMPM_RVE_BODY_H
 #define DEMPM_RVE_BODY_H
 
@@ -60,18 +60,23 @@ RVE_FN void rve_branch(int dim, const rve_real h[9], const rve_int si[3], const 
   }
 }
 
-/* How branches follow the flow from one step to the next. */
+/* How branches follow the flow from one step to the next: d <- exp(L dt) (d + u dt). With s += H^-1 v dt and H <- exp(L dt) H that is what
+ * positions give but for round-off, without reading these or looking up images. */
 typedef struct RveCarry {
   rve_near map[9], dt; /* exp(L dt) - 1; s */
   int fresh;           /* 1: in this pass positions give all branches */
 } RveCarry;
 
-#ifndef RVE_MIXED
-/* ------------------------------------------------------------------------------------------------------------- FP64 */
-
-typedef RveBody RveNearBody;
-#define near_own_body rve_own_body
-#define near_dot rve_dot
+/* 1 if positions have to give a row's branches, which from now on are carried. A row in which nothing touched the step before has none,
+ * it may have rested since. */
+RVE_FN int rve_branch_is_due(const RveCarry *carry, const RveArrays *a, int lane0) {
+  double *const idle = &a->idle_until[lane0 / RVE_PACK];
+  int64_t rested; /* compared as an integer: it is 0 or not */
+  memcpy(&rested, idle, sizeof rested);
+  if (__builtin_expect(!(carry->fresh || rested), 1)) return 0;
+  *idle = 0.0;
+  return 1;
+}
 
 /* Where the neighbours are. */
 RVE_FN void rve_neighbour_position(int dim, const RveArrays *a, int lane0, RveBody *other) {
@@ -79,6 +84,23 @@ RVE_FN void rve_neighbour_position(int dim, const RveArrays *a, int lane0, RveBo
     other->s[k] =
         rve_int_from_bits(rve_pick((const double *)(const void *)a->position[k], a->neighbour, lane0, rve_row_doubles(dim)));
 }
+
+/* Branches from positions. The owners' are read again: kept for this seldom use, they would take room from what each row wants (4 % in
+ * 2D). */
+RVE_FN void rve_branch_of_positions(int dim, const rve_real h[9], const RveArrays *a, int own0, int lane0, rve_int image,
+                                    rve_real d[3]) {
+  RveBody i, j;
+  for (int k = 0; k < dim; k++) i.s[k] = rve_load_int(a->position[k], own0);
+  rve_neighbour_position(dim, a, lane0, &j);
+  rve_branch(dim, h, i.s, j.s, image, d);
+}
+
+#ifndef RVE_MIXED
+/* ------------------------------------------------------------------------------------------------------------- FP64 */
+
+typedef RveBody RveNearBody;
+#define near_own_body rve_own_body
+#define near_dot rve_dot
 
 #if !RVE_CARRIES /* CUDA and plain code: arrays are read, positions give all branches */
 /* Places and radii of neighbours; then the rest. */
@@ -106,8 +128,6 @@ RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_re
 }
 
 #else
-/* Rows: 2D v w r, 3D v r | w m. Positions are seldom wanted, and masses in 2D: these come from the arrays. */
-
 /* Velocities and radii of neighbours (2D: and all else); then the rest. */
 RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   const RveQuad q = rve_gather(a->row, a->neighbour, lane0);
@@ -145,23 +165,13 @@ RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const R
   rve_scatter(a->row + 4, stride, none, lane0, p);
 }
 
-/* Branches d, and the relative velocities u of the fluctuations. With s += H^-1 v dt and H <- exp(L dt) H a branch follows as
- * d <- exp(L dt) (d + u dt): the same as from positions but for round-off, without reading these or looking up images. A row in which
- * nothing touched the step before has no branches, it may have rested since. */
+/* Branches d, and the relative velocities u of the fluctuations. */
 RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_real h[9], const RveArrays *a, const RveBody *own,
                              const RveBody *other, int lane0, rve_real u[3], rve_real d[3]) {
   const int dim = ft.dimension;
-  double *const idle = &a->idle_until[lane0 / RVE_PACK];
-  int64_t rested; /* compared as an integer: it is 0 or not */
-  memcpy(&rested, idle, sizeof rested);
   for (int k = 0; k < dim; k++) u[k] = other->v[k] - own->v[k];
-  if (__builtin_expect(carry->fresh || rested, 0)) {
-    RveBody i, j;
-    /* Read again: own->s, kept for this seldom use, would take room from what each row wants (4 % in 2D). */
-    for (int k = 0; k < dim; k++) i.s[k] = rve_load_int(a->position[k], own->lane0);
-    rve_neighbour_position(dim, a, lane0, &j);
-    rve_branch(dim, h, i.s, j.s, rve_load_short(a->image, lane0), d);
-    *idle = 0.0;
+  if (rve_branch_is_due(carry, a, lane0)) {
+    rve_branch_of_positions(dim, h, a, own->lane0, lane0, rve_load_short(a->image, lane0), d);
   } else {
     rve_real e[3];
     for (int k = 0; k < dim; k++) e[k] = rve_load(a->branch[k], lane0) + carry->dt * u[k];
@@ -230,10 +240,10 @@ RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real f
 }
 
 #else
-/* ---------------------------------------------------------------------------------------------------- pairs of FP32 */
+/* ------------------------------------------------------------------------------------------------------------- FP32 */
 
 typedef struct RveNearBody {
-  near_int s[3];
+  int lane0;
   rve_near v[3], w[3], r, m;
 } RveNearBody;
 
@@ -245,119 +255,90 @@ RVE_FN rve_near near_dot(int dim, const rve_near a[3], const rve_near b[3]) {
 
 RVE_FN RveNearBody near_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
   RveNearBody own;
-  for (int k = 0; k < ft.dimension; k++) {
-    own.s[k] = near_load_int(a->position[k], lane0);
-    own.v[k] = near_load(a->velocity[k], lane0);
-  }
+  own.lane0 = lane0;
+  for (int k = 0; k < ft.dimension; k++) own.v[k] = near_load(a->velocity[k], lane0);
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) own.w[k] = near_load(a->spin[k], lane0);
   own.r = near_load(a->radius, lane0);
   if (ft.viscous) own.m = near_load(a->mass, lane0);
   return own;
 }
 
-/* 2D rows have no room for the mass. */
-RVE_FN rve_real near_neighbour_mass(const RveArrays *a, int lane0) {
-  const __m256i at = _mm256_srli_epi32(_mm256_load_si256((const void *)(a->neighbour + lane0)), 2);
-  return _mm512_i32gather_pd(at, a->mass, 8);
-}
-
-/* In 2D one row has all. */
+/* Velocities and radii of neighbours (2D: and all else); then the rest. */
 RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
-  const RveQuad p = rve_gather(a->row, a->neighbour, lane0), q = rve_gather(a->row, a->neighbour, lane0 + 8);
-  for (int k = 0; k < ft.dimension; k++) {
-    other->s[k].half[0] = rve_int_from_bits(p.f[k]);
-    other->s[k].half[1] = rve_int_from_bits(q.f[k]);
-  }
-  if (ft.dimension == 2) {
-    for (int k = 0; k < 2; k++) other->v[k] = near_unpair(p.f[2], q.f[2], k);
-    other->w[0] = near_unpair(p.f[3], q.f[3], 0);
-    other->r = near_unpair(p.f[3], q.f[3], 1);
-    return;
-  }
-  other->r = near_unpair(p.f[3], q.f[3], 0);
-  if (ft.viscous) other->m = near_unpair(p.f[3], q.f[3], 1);
+  rve_near q[4];
+  near_gather(a->row, a->neighbour + lane0, q);
+  for (int k = 0; k < ft.dimension; k++) other->v[k] = q[k];
+  if (ft.dimension == 2) other->w[0] = q[2];
+  other->r = q[3];
+  if (ft.dimension == 2 && ft.viscous)
+    other->m = near_join(_mm512_cvtpd_ps(rve_pick(a->mass, a->neighbour, lane0, rve_row_doubles(2))),
+                         _mm512_cvtpd_ps(rve_pick(a->mass, a->neighbour, lane0 + RVE_SPAN, rve_row_doubles(2))));
 }
-
 RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
-  if (ft.dimension == 2) {
-    if (ft.viscous)
-      other->m = near_join(_mm512_cvtpd_ps(near_neighbour_mass(a, lane0)),
-                           _mm512_cvtpd_ps(near_neighbour_mass(a, lane0 + 8)));
-    return;
-  }
-  const RveQuad t = rve_gather(a->row + 4, a->neighbour, lane0),
-                u = rve_gather(a->row + 4, a->neighbour, lane0 + 8);
-  for (int k = 0; k < 3; k++) other->v[k] = near_unpair(t.f[k / 2], u.f[k / 2], k % 2);
-  for (int k = 0; ft.tangential && k < 3; k++)
-    other->w[k] = near_unpair(t.f[(k + 3) / 2], u.f[(k + 3) / 2], (k + 3) % 2);
+  rve_near q[4];
+  if (ft.dimension == 2) return;
+  near_gather(a->row + 2, a->neighbour + lane0, q);
+  for (int k = 0; k < 3; k++) other->w[k] = q[k];
+  other->m = q[3];
 }
 
 RVE_FN void near_keep_place(RveFeatures ft, const RveNearBody *other, RveNearBody *kept) {
   kept->r = other->r;
-  if (ft.dimension == 3) {
-    if (ft.viscous) kept->m = other->m;
-    return;
-  }
-  for (int k = 0; (ft.tangential || ft.viscous) && k < 2; k++) kept->v[k] = other->v[k];
-  if (ft.tangential) kept->w[0] = other->w[0];
+  if (ft.dimension == 3) return;
+  kept->w[0] = other->w[0];
+  if (ft.viscous) kept->m = other->m;
 }
 
+/* In FP64, from the arrays. */
 RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  const int row = rve_row_doubles(ft.dimension);
   RveBody other;
-  const RveQuad p = rve_gather(a->row, a->neighbour, lane0);
-  for (int k = 0; k < ft.dimension; k++) other.s[k] = rve_int_from_bits(p.f[k]);
-  if (ft.dimension == 2) {
-    for (int k = 0; k < 2; k++) other.v[k] = near_pair_part(p.f[2], k);
-    other.w[0] = near_pair_part(p.f[3], 0), other.r = near_pair_part(p.f[3], 1);
-    if (ft.viscous) other.m = near_neighbour_mass(a, lane0);
-    return other;
-  }
-  const RveQuad t = rve_gather(a->row + 4, a->neighbour, lane0);
-  other.r = near_pair_part(p.f[3], 0), other.m = near_pair_part(p.f[3], 1);
-  for (int k = 0; k < 3; k++) {
-    other.v[k] = near_pair_part(t.f[k / 2], k % 2);
-    other.w[k] = near_pair_part(t.f[(k + 3) / 2], (k + 3) % 2);
-  }
+  rve_neighbour_position(ft.dimension, a, lane0, &other);
+  for (int k = 0; k < ft.dimension; k++) other.v[k] = rve_pick(a->velocity[k], a->neighbour, lane0, row);
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) other.w[k] = rve_pick(a->spin[k], a->neighbour, lane0, row);
+  other.r = rve_pick(a->radius, a->neighbour, lane0, row);
+  if (ft.viscous) other.m = rve_pick(a->mass, a->neighbour, lane0, row);
   return other;
 }
 
 RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
-  double *const none[4] = {0, 0, 0, 0};
   const int stride = rve_row_doubles(dimension);
-  RveQuad q = {{rve_bits_from_int(b->s[0]), rve_bits_from_int(b->s[1]), near_pair(b->v[0], b->v[1]),
-                near_pair(b->w[0], b->r)}};
+  double *const row = a->row + (size_t)lane0 * (size_t)stride;
   if (dimension == 2) {
-    rve_scatter(a->row, stride, none, lane0, q);
+    near_scatter(row, stride, b->v[0], b->v[1], b->w[0], b->r);
     return;
   }
-  q.f[2] = rve_bits_from_int(b->s[2]);
-  q.f[3] = near_pair(b->r, b->m);
-  const RveQuad t = {{near_pair(b->v[0], b->v[1]), near_pair(b->v[2], b->w[0]), near_pair(b->w[1], b->w[2]), rve_set(0.0)}};
-  rve_scatter(a->row, stride, none, lane0, q);
-  rve_scatter(a->row + 4, stride, none, lane0, t);
+  near_scatter(row, stride, b->v[0], b->v[1], b->v[2], b->r);
+  near_scatter(row + 2, stride, b->w[0], b->w[1], b->w[2], b->m);
 }
 
-/* The rounding of H alone would stretch all branches of a direction alike. */
-RVE_FN void near_branch(int dim, const rve_near h[18], const near_int si[3], const near_int sj[3], near_image image,
-                        rve_near d[3]) {
-  const rve_int low = _mm512_cvtepu16_epi64(_mm256_castsi256_si128(image)),
-                high = _mm512_cvtepu16_epi64(_mm256_extracti128_si256(image, 1));
-  rve_near x[3];
-  for (int k = 0; k < dim; k++)
-    x[k] = near_join(_mm512_cvtepi64_ps(rve_fraction(si[k].half[0], sj[k].half[0], low, k)),
-                     _mm512_cvtepi64_ps(rve_fraction(si[k].half[1], sj[k].half[1], high, k)));
-  for (int k = 0; k < dim; k++) {
-    d[k] = h[9 + 3 * k] * x[0] + h[9 + 3 * k + 1] * x[1];
-    if (dim == 3) d[k] = d[k] + h[9 + 3 * k + 2] * x[2];
-    d[k] = d[k] + h[3 * k] * x[0] + h[3 * k + 1] * x[1];
-    if (dim == 3) d[k] = d[k] + h[3 * k + 2] * x[2];
-  }
-}
-
-RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_near h[18], const RveArrays *a,
+/* Branches and relative velocities. A branch is the sum of two FP32 numbers: what it changes by in a step may be less than the last digit
+ * of the first, which alone enters the contact. */
+RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_real h[9], const RveArrays *a,
                              const RveNearBody *own, const RveNearBody *other, int lane0, rve_near u[3], rve_near d[3]) {
-  (void)carry, (void)u;
-  near_branch(ft.dimension, h, own->s, other->s, near_load_image(a->image, lane0), d);
+  const int dim = ft.dimension;
+  rve_near rest[3];
+  for (int k = 0; k < dim; k++) u[k] = other->v[k] - own->v[k];
+  if (rve_branch_is_due(carry, a, lane0)) {
+    const near_image image = near_load_image(a->image, lane0);
+    rve_real low[3], high[3];
+    rve_branch_of_positions(dim, h, a, own->lane0, lane0, near_image_half(image, 0), low);
+    rve_branch_of_positions(dim, h, a, own->lane0 + RVE_SPAN, lane0 + RVE_SPAN, near_image_half(image, 1), high);
+    for (int k = 0; k < dim; k++) near_split(low[k], high[k], &d[k], &rest[k]);
+  } else {
+    rve_near old[3], e[3];
+    for (int k = 0; k < dim; k++) {
+      near_load_sum(a->branch[k], lane0, &old[k], &rest[k]);
+      e[k] = near_fma(carry->dt, u[k], old[k]);
+    }
+    for (int k = 0; k < dim; k++) {
+      rest[k] = near_fma(carry->map[3 * k], e[0], near_fma(carry->map[3 * k + 1], e[1], near_fma(carry->dt, u[k], rest[k])));
+      if (dim == 3) rest[k] = near_fma(carry->map[3 * k + 2], e[2], rest[k]);
+      d[k] = old[k] + rest[k];
+      rest[k] = rest[k] - (d[k] - old[k]);
+    }
+  }
+  for (int k = 0; k < dim; k++) near_store_sum(a->branch[k], lane0, d[k], rest[k]);
 }
 
 RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
@@ -374,9 +355,9 @@ RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, c
 }
 
 RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real force[3]) {
-  RveFour row[RVE_SPAN];
+  NearFour row[RVE_SPAN];
   for (int l = 0; l < RVE_SPAN; l++) row[l] = near_four(a->reaction + (size_t)rve_place(RVE_PACK, lane0 + l) * 2);
-  const RveQuad q = rve_transpose(row);
+  const RveQuad q = near_transpose(row);
   for (int k = 0; k < dim; k++) force[k] = q.f[k];
 }
 
@@ -384,20 +365,14 @@ RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real f
 
 /* ----------------------------------------------------------------------------------------------------- both forms */
 
-/* 1 if all slots that a row of the incoming list names rest; then their reactions are 0. */
+/* 1 if all slots that a row of the incoming list names rest; then their reactions are 0. Asked in every fourth step: a row that does
+ * not rest yet can be added, too. */
 RVE_FN int rve_incoming_rests(const RveHead *head, const RveArrays *a, int row) {
   if (head->approach < a->incoming_idle[row]) return 1;
-  double until = 1e300;
-#if defined(__CUDACC__)
-  until = 0.0 - rve_largest(0.0 - a->idle_until[a->incoming[row * RVE_PACK + RVE_LANE] / RVE_PACK]);
-#else
-  for (int l = 0; l < RVE_PACK; l++) {
-    const double here = a->idle_until[a->incoming[row * RVE_PACK + l] / (RVE_PACK * RVE_REACTION)];
-    until = here < until ? here : until;
-  }
-#endif
-  a->incoming_idle[row] = until;
-  return head->approach < until;
+  if (head->steps % 4 != 0) return 0;
+  rve_real until = rve_pick_idle(a->idle_until, a->incoming, row * RVE_PACK);
+  if (RVE_PARTS == 2) until = rve_min(until, rve_pick_idle(a->idle_until, a->incoming, row * RVE_PACK + RVE_SPAN));
+  return head->approach < (a->incoming_idle[row] = 0.0 - rve_largest(0.0 - until));
 }
 
 /* What the slots of one row of the incoming list did to a span of grains. CPUs keep it as it is stored, of each lane a reaction's first
@@ -406,8 +381,8 @@ typedef struct RveIncoming {
 #if defined(__CUDACC__)
   rve_real force[3], torque[3];
 #else
-  RveFour four[RVE_SPAN];
-  RveTwo two[RVE_SPAN];
+  NearFour four[RVE_SPAN];
+  NearTwo two[RVE_SPAN];
 #endif
 #if defined(RVE_WHOLE_REACTIONS)
   rve_real whole[RVE_SPAN];
@@ -452,8 +427,8 @@ RVE_FN void rve_read_incoming(RveFeatures ft, const RveArrays *a, const uint32_t
 RVE_FN void rve_add_incoming(RveFeatures ft, const RveIncoming *in, RveIncoming *sum) {
   const int parts = rve_incoming_parts(ft);
   for (int l = 0; l < RVE_SPAN; l++) {
-    if (parts & RVE_FOUR) sum->four[l] = rve_four_add(sum->four[l], in->four[l]);
-    if (parts & RVE_TWO) sum->two[l] = rve_two_add(sum->two[l], in->two[l]);
+    if (parts & RVE_FOUR) sum->four[l] = near_four_add(sum->four[l], in->four[l]);
+    if (parts & RVE_TWO) sum->two[l] = near_two_add(sum->two[l], in->two[l]);
 #if defined(RVE_WHOLE_REACTIONS)
     if (parts & RVE_ALL) sum->whole[l] = sum->whole[l] + in->whole[l];
 #endif
@@ -469,10 +444,10 @@ RVE_FN void rve_split_incoming(RveFeatures ft, const RveIncoming *sum, rve_real 
     return;
   }
 #endif
-  const RveQuad q = rve_transpose(sum->four);
+  const RveQuad q = near_transpose(sum->four);
   for (int k = 0; k < ft.dimension; k++) force[k] = q.f[k];
   torque[0] = q.f[ft.dimension];
-  if (parts & RVE_TWO) rve_unpair(sum->two, torque + 1);
+  if (parts & RVE_TWO) near_unpair(sum->two, torque + 1);
 }
 #endif
 

@@ -13,7 +13,7 @@
 /* --------------------------------------------------------------------------------------------------- contact pass */
 
 typedef struct RveContactPass {
-  rve_near h[9 * RVE_PARTS]; /* H times rve_fraction_unit(); in FP32 also what its rounding left */
+  rve_real h[9];             /* H times RVE_UNIT */
   rve_near rate[9]; /* D; without dashpots less D_xx on the diagonal: sliding does not see what is along the branch */
   rve_near turn[9];
   rve_near kn, kt_dt, kt, mu, mu_kn, dt, gn, gt, gc, bond, bond_ratio;
@@ -33,9 +33,7 @@ RVE_FN double rve_bond_force_factor(const RveCall *call, double temperature) {
 RVE_FN RveContactPass rve_contact_pass_of(RveFeatures ft, const RveCall *call, const RveHead *head, double dt) {
   RveContactPass c;
   for (int k = 0; k < 9; k++) {
-    const double h = head->cell[k] * RVE_UNIT;
-    c.h[k] = near_set(h);
-    if (RVE_PARTS == 2) c.h[9 + k] = near_set(h - (float)h);
+    c.h[k] = rve_set(head->cell[k] * RVE_UNIT);
     c.rate[k] = near_set(call->rate[k] - (!ft.viscous && k % 4 == 0 ? call->rate[0] : 0.0));
     c.turn[k] = near_set(call->turn[k]);
   }
@@ -285,16 +283,20 @@ RVE_FN void rve_add_contact(RveFeatures ft, const RveContactPass *c, const RveAr
   for (int k = 0; ft.tangential && k < rve_spins(ft); k++) sum->torque[k] = sum->torque[k] + p.torque[k];
 }
 
-/* The rows of one block, each part of the computation for up to RVE_CHUNK of them in turn. The block's own grains are
- * read again where they are needed: as operands from memory they take no registers. */
+/* A block's own grains for one more loop: read again, as operands from memory, that take no registers. FP32 is made of them once. */
+RVE_FN RveNearBody rve_own_again(RveFeatures ft, const RveArrays *a, const RveNearBody *own) {
+  return RVE_PARTS > 1 ? *own : near_own_body(ft, a, own->lane0);
+}
+
+/* The rows of one block, each part of the computation for up to RVE_CHUNK of them in turn. */
 RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const RveHead *head, const RveArrays *a, int block,
-                               RveContactSums *sum) {
+                               const RveNearBody *first, RveContactSums *sum) {
   for (int at = a->slot_first[block]; at < a->slot_first[block + 1];) {
     RveRow row[RVE_CHUNK];
     int rows = 0;
     for (; at < a->slot_first[block + 1] && rows < RVE_CHUNK; at++) {
       if (head->approach < a->idle_until[at]) continue;
-      const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+      const RveNearBody own = rve_own_again(ft, a, first);
       RveNearBody other;
       near_neighbour_place(ft, a, at * RVE_PACK, &other);
       if (rve_meet(ft, c, a, &own, &other, at * RVE_PACK, &row[rows])) rows++;
@@ -302,11 +304,11 @@ RVE_FN void rve_contact_chunks(RveFeatures ft, const RveContactPass *c, const Rv
     }
     if (ft.tangential || ft.viscous)
       for (int r = 0; r < rows; r++) {
-        const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+        const RveNearBody own = rve_own_again(ft, a, first);
         rve_slide(ft, c, a, &own, &row[r]);
       }
     for (int r = 0; r < rows; r++) {
-      const RveNearBody own = near_own_body(ft, a, block * RVE_PACK);
+      const RveNearBody own = rve_own_again(ft, a, first);
       rve_add_contact(ft, c, a, &own, &row[r], sum);
     }
   }
@@ -389,7 +391,7 @@ RVE_FN void rve_contact_pass(RveFeatures ft, const RveTeam *team, const RveCall 
     const RveNearBody own = near_own_body(ft, a, lane0);
     rve_fetch_ahead(s);
     for (int k = 0; k < 3; k++) sum.force[k] = sum.torque[k] = near_set(0.0);
-    if (chunks) rve_contact_chunks(ft, &c, head, a, block, &sum);
+    if (chunks) rve_contact_chunks(ft, &c, head, a, block, &own, &sum);
     else rve_contact_rows(ft, &c, head, a, block, &own, &rows, &sum);
     for (int k = 0; k < ft.dimension; k++) near_store(a->force[k], lane0, sum.force[k]);
     for (int k = 0; ft.tangential && k < rve_spins(ft); k++) near_store(a->torque[k], lane0, sum.torque[k]);

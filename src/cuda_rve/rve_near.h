@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The numbers in which contacts are computed ("near"): the kernels' own, or with RVE_MIXED FP32 on twice the lanes.
  *
- * Mixed precision keeps positions in fixed point and motion and all sums in FP64. Differences of positions are taken
- * before they become FP32, so that a branch has a relative error of 6e-8 wherever the grains are. */
+ * Mixed precision keeps positions in fixed point and motion and sums in FP64, but for those over the few contacts of a grain. Branches are carried along to 48 bits and come
+ * from differences of positions, so that what enters a contact has a relative error of 6e-8 wherever the grains are. */
 #ifndef DEMPM_RVE_NEAR_H
 #define DEMPM_RVE_NEAR_H
 
@@ -38,15 +38,18 @@ typedef rve_mask near_mask;
 #define near_select rve_select
 #define near_keep rve_keep
 #define near_sum_wide(a) (a)
+#define NearFour RveFour
+#define NearTwo RveTwo
 #define near_four rve_four
 #define near_two rve_two
+#define near_four_add rve_four_add
+#define near_two_add rve_two_add
+#define near_transpose rve_transpose
+#define near_unpair rve_unpair
 
 #else /* 16 lanes of FP32 beside 8 of FP64 */
 
 typedef __m512 rve_near;
-typedef struct near_int {
-  rve_int half[2];
-} near_int;
 typedef __m256i near_image; /* 16 uint16 */
 typedef __mmask16 near_mask;
 
@@ -63,10 +66,6 @@ RVE_FN rve_real near_half(rve_near a, int half) {
 RVE_FN void near_store(double *a, int lane0, rve_near b) {
   rve_store(a, lane0, near_half(b, 0));
   rve_store(a, lane0 + 8, near_half(b, 1));
-}
-RVE_FN near_int near_load_int(const int64_t *a, int lane0) {
-  const near_int b = {{rve_load_int(a, lane0), rve_load_int(a, lane0 + 8)}};
-  return b;
 }
 RVE_FN near_image near_load_image(const uint16_t *a, int lane0) {
   return _mm256_load_si256((const __m256i *)(const void *)(a + lane0));
@@ -102,21 +101,56 @@ RVE_FN rve_near near_keep(near_mask m, rve_near a) { return _mm512_maskz_mov_ps(
 /* Both halves of a sum in FP64, on the lanes of one. */
 RVE_FN rve_real near_sum_wide(rve_near a) { return near_half(a, 0) + near_half(a, 1); }
 
-/* Two FP32 numbers share 8 bytes, the first in the low half. */
-RVE_FN rve_real near_pair(rve_real a, rve_real b) {
-  const rve_int low = _mm512_cvtepu32_epi64(_mm256_castps_si256(_mm512_cvtpd_ps(a)));
-  const rve_int high = _mm512_cvtepu32_epi64(_mm256_castps_si256(_mm512_cvtpd_ps(b)));
-  return rve_bits_from_int(_mm512_or_si512(low, _mm512_slli_epi64(high, 32)));
+/* Four FP32 fields of one row. */
+RVE_FN __m128 near_row(const double *at) { return _mm_castpd_ps(_mm_load_pd(at)); }
+
+/* The image shifts of eight slots. */
+RVE_FN rve_int near_image_half(near_image image, int half) {
+  return _mm512_cvtepu16_epi64(half ? _mm256_extracti128_si256(image, 1) : _mm256_castsi256_si128(image));
 }
-RVE_FN rve_real near_pair_part(rve_real pair, int second) {
-  const rve_int bits = rve_int_from_bits(pair);
-  return _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(second ? _mm512_srli_epi64(bits, 32) : bits)));
+
+/* An FP64 number as the sum of two in FP32, to 48 bits. */
+RVE_FN void near_split(rve_real low, rve_real high, rve_near *first, rve_near *rest) {
+  const __m256 l = _mm512_cvtpd_ps(low), h = _mm512_cvtpd_ps(high);
+  *first = near_join(l, h);
+  *rest = near_join(_mm512_cvtpd_ps(low - _mm512_cvtps_pd(l)), _mm512_cvtpd_ps(high - _mm512_cvtps_pd(h)));
 }
-/* One part of the pairs of 16 lanes. */
-RVE_FN rve_near near_unpair(rve_real low, rve_real high, int second) {
-  const __m512i first = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-  const __m512i pick = second ? _mm512_add_epi32(first, _mm512_set1_epi32(1)) : first;
-  return _mm512_permutex2var_ps(_mm512_castpd_ps(low), pick, _mm512_castpd_ps(high));
+/* Such sums where 16 FP64 numbers have room. */
+RVE_FN void near_load_sum(const double *a, int lane0, rve_near *first, rve_near *rest) {
+  *first = _mm512_load_ps(a + lane0), *rest = _mm512_load_ps(a + lane0 + 8);
+}
+RVE_FN void near_store_sum(double *a, int lane0, rve_near first, rve_near rest) {
+  _mm512_store_ps(a + lane0, first), _mm512_store_ps(a + lane0 + 8, rest);
+}
+
+/* Four FP32 fields of the grains that `offset` names, in doubles. */
+RVE_FN void near_gather(const double *rows, const uint32_t *offset, rve_near field[4]) {
+  rve_near row[4]; /* 128-bit lane q of row[k] is that of slot 4 q + k */
+  for (int k = 0; k < 4; k++) {
+    row[k] = _mm512_castps128_ps512(near_row(rows + offset[k]));
+    row[k] = _mm512_insertf32x4(row[k], near_row(rows + offset[4 + k]), 1);
+    row[k] = _mm512_insertf32x4(row[k], near_row(rows + offset[8 + k]), 2);
+    row[k] = _mm512_insertf32x4(row[k], near_row(rows + offset[12 + k]), 3);
+  }
+  const rve_real a = _mm512_castps_pd(_mm512_unpacklo_ps(row[0], row[1]));
+  const rve_real b = _mm512_castps_pd(_mm512_unpackhi_ps(row[0], row[1]));
+  const rve_real c = _mm512_castps_pd(_mm512_unpacklo_ps(row[2], row[3]));
+  const rve_real d = _mm512_castps_pd(_mm512_unpackhi_ps(row[2], row[3]));
+  field[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(a, c)), field[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
+  field[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(b, d)), field[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
+}
+/* Writes four fields of eight rows of `stride` doubles as FP32. */
+RVE_FN void near_scatter(double *rows, int stride, rve_real f0, rve_real f1, rve_real f2, rve_real f3) {
+  const __m256 a = _mm512_cvtpd_ps(f0), b = _mm512_cvtpd_ps(f1), c = _mm512_cvtpd_ps(f2), d = _mm512_cvtpd_ps(f3);
+  const __m256d ab0 = _mm256_castps_pd(_mm256_unpacklo_ps(a, b)), ab1 = _mm256_castps_pd(_mm256_unpackhi_ps(a, b));
+  const __m256d cd0 = _mm256_castps_pd(_mm256_unpacklo_ps(c, d)), cd1 = _mm256_castps_pd(_mm256_unpackhi_ps(c, d));
+  /* halves of row[k] are rows k and k + 4 */
+  const __m256d row[4] = {_mm256_unpacklo_pd(ab0, cd0), _mm256_unpackhi_pd(ab0, cd0), _mm256_unpacklo_pd(ab1, cd1),
+                          _mm256_unpackhi_pd(ab1, cd1)};
+  for (int k = 0; k < 4; k++) {
+    _mm_store_pd(rows + k * stride, _mm256_castpd256_pd128(row[k]));
+    _mm_store_pd(rows + (4 + k) * stride, _mm256_extractf128_pd(row[k], 1));
+  }
 }
 /* Writes four FP32 fields of a pack of slots where rve_place says. */
 RVE_FN void near_scatter_placed(double *rows, int lane0, const rve_near field[4]) {
@@ -136,9 +170,34 @@ RVE_FN void near_scatter_pairs(double *rows, int lane0, rve_near a, rve_near b) 
   rve_store(rows, lane0, _mm512_castps_pd(_mm512_permutex2var_ps(a, first, b)));
   rve_store(rows, lane0 + 8, _mm512_castps_pd(_mm512_permutex2var_ps(a, second, b)));
 }
-/* Two FP32 fields of one row, as FP64; four. */
-RVE_FN RveTwo near_two(const double *at) { return _mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd(at))); }
-RVE_FN RveFour near_four(const double *at) { return _mm256_cvtps_pd(_mm_castpd_ps(_mm_load_pd(at))); }
+/* Two FP32 fields of one row, behind which there is another; the sum of some; the first and the second fields of eight. */
+typedef __m128 NearTwo;
+RVE_FN NearTwo near_two(const double *at) { return _mm_castpd_ps(_mm_loadu_pd(at)); }
+RVE_FN NearTwo near_two_add(NearTwo a, NearTwo b) { return _mm_add_ps(a, b); }
+RVE_FN void near_unpair(const NearTwo pair[8], rve_real sum[2]) {
+  __m128 half[2][2]; /* fields of pairs 0 to 3, 4 to 7 */
+  for (int h = 0; h < 2; h++) {
+    const __m128 even = _mm_unpacklo_ps(pair[4 * h], pair[4 * h + 1]), odd = _mm_unpacklo_ps(pair[4 * h + 2], pair[4 * h + 3]);
+    half[0][h] = _mm_movelh_ps(even, odd), half[1][h] = _mm_movehl_ps(odd, even);
+  }
+  for (int k = 0; k < 2; k++) sum[k] = _mm512_cvtps_pd(_mm256_set_m128(half[k][1], half[k][0]));
+}
+/* The same for four. */
+typedef __m128 NearFour;
+RVE_FN NearFour near_four(const double *at) { return near_row(at); }
+RVE_FN NearFour near_four_add(NearFour a, NearFour b) { return _mm_add_ps(a, b); }
+RVE_FN RveQuad near_transpose(const NearFour row[8]) {
+  RveQuad q;
+  __m256 r[4];
+  for (int k = 0; k < 4; k++) r[k] = _mm256_set_m128(row[4 + k], row[k]);
+  const __m256d a = _mm256_castps_pd(_mm256_unpacklo_ps(r[0], r[1])), b = _mm256_castps_pd(_mm256_unpackhi_ps(r[0], r[1]));
+  const __m256d c = _mm256_castps_pd(_mm256_unpacklo_ps(r[2], r[3])), d = _mm256_castps_pd(_mm256_unpackhi_ps(r[2], r[3]));
+  q.f[0] = _mm512_cvtps_pd(_mm256_castpd_ps(_mm256_unpacklo_pd(a, c)));
+  q.f[1] = _mm512_cvtps_pd(_mm256_castpd_ps(_mm256_unpackhi_pd(a, c)));
+  q.f[2] = _mm512_cvtps_pd(_mm256_castpd_ps(_mm256_unpacklo_pd(b, d)));
+  q.f[3] = _mm512_cvtps_pd(_mm256_castpd_ps(_mm256_unpackhi_pd(b, d)));
+  return q;
+}
 
 #endif
 #endif

@@ -22,14 +22,7 @@ typedef struct RveTwo {
 #endif
 
 /* RveCounts.row of these kernels. */
-#if RVE_CARRIES || defined(RVE_MIXED)
-RVE_FN int rve_row_doubles(int dimension) { return 4 * (dimension - 1); }
-#else
-RVE_FN int rve_row_doubles(int dimension) {
-  (void)dimension;
-  return 0;
-}
-#endif
+RVE_FN int rve_row_doubles(int dimension) { return RVE_CARRIES ? 4 / RVE_PARTS * (dimension - 1) : 0; }
 
 typedef struct RveQuad {
   rve_real f[4];
@@ -85,10 +78,8 @@ RVE_FN void rve_transpose_back(RveQuad q, RveFour row[RVE_SPAN]) {
 RVE_FN RveFour rve_four(const double *at) { return _mm256_load_pd(at); }
 RVE_FN void rve_four_store(double *at, RveFour a) { _mm256_store_pd(at, a); }
 RVE_FN RveFour rve_four_add(RveFour a, RveFour b) { return _mm256_add_pd(a, b); }
-RVE_FN RveFour rve_four_zero(void) { return _mm256_setzero_pd(); }
 RVE_FN RveTwo rve_two(const double *at) { return _mm_load_pd(at); }
 RVE_FN RveTwo rve_two_add(RveTwo a, RveTwo b) { return _mm_add_pd(a, b); }
-RVE_FN RveTwo rve_two_zero(void) { return _mm_setzero_pd(); }
 #elif !defined(__CUDACC__)
 RVE_FN RveFour rve_four(const double *at) {
   RveFour a;
@@ -102,10 +93,6 @@ RVE_FN RveFour rve_four_add(RveFour a, RveFour b) {
   for (int k = 0; k < 4; k++) a.f[k] += b.f[k];
   return a;
 }
-RVE_FN RveFour rve_four_zero(void) {
-  const RveFour zero = {{0.0, 0.0, 0.0, 0.0}};
-  return zero;
-}
 RVE_FN RveTwo rve_two(const double *at) {
   const RveTwo a = {{at[0], at[1]}};
   return a;
@@ -113,10 +100,6 @@ RVE_FN RveTwo rve_two(const double *at) {
 RVE_FN RveTwo rve_two_add(RveTwo a, RveTwo b) {
   for (int k = 0; k < 2; k++) a.f[k] += b.f[k];
   return a;
-}
-RVE_FN RveTwo rve_two_zero(void) {
-  const RveTwo zero = {{0.0, 0.0}};
-  return zero;
 }
 RVE_FN void rve_unpair(const RveTwo pair[1], rve_real sum[2]) {
   for (int k = 0; k < 2; k++) sum[k] = pair[0].f[k];
@@ -224,8 +207,8 @@ RVE_FN void rve_unpair(const RveTwo pair[RVE_SPAN], rve_real sum[2]) {
 }
 #endif
 
-/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by where their rows of `row` doubles begin (4 or
- * 8), or without rows, CUDA and plain code, by themselves (0). */
+/* The numbers of an array, one per lane, of the grains that RveArrays.neighbour names: by where their rows of `row` doubles begin (2, 4
+ * or 8), or without rows, CUDA and plain code, by themselves (0). */
 RVE_FN rve_real rve_pick(const double *field, const uint32_t *neighbour, int lane0, int row) {
 #if defined(RVE_ISA_AVX512)
   const __m256i at = _mm256_load_si256((const __m256i *)(const void *)(neighbour + lane0));
@@ -234,7 +217,9 @@ RVE_FN rve_real rve_pick(const double *field, const uint32_t *neighbour, int lan
   /* All lanes are overwritten, but the processor waits for what they were: gcc 12 would take any register, last used for the row before. */
   __asm__("" : "+v"(from));
   __asm__("" : "+k"(all));
-  return row == 8 ? _mm512_mask_i32gather_pd(from, all, at, field, 1) : _mm512_mask_i32gather_pd(from, all, at, field, 2);
+  return row == 8   ? _mm512_mask_i32gather_pd(from, all, at, field, 1)
+         : row == 4 ? _mm512_mask_i32gather_pd(from, all, at, field, 2)
+                    : _mm512_mask_i32gather_pd(from, all, at, field, 4);
 #elif defined(RVE_ISA_AVX2)
   const __m128i at = _mm_load_si128((const __m128i *)(const void *)(neighbour + lane0));
   const rve_real from = rve_set(0.0), all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
@@ -243,6 +228,19 @@ RVE_FN rve_real rve_pick(const double *field, const uint32_t *neighbour, int lan
   rve_real a;
   memcpy(&a, field + neighbour[lane0 + RVE_LANE] / (uint32_t)(row > 0 ? row : 1), sizeof a);
   return a;
+#endif
+}
+
+/* Until when the rows of slots rest that RveArrays.incoming names. */
+RVE_FN rve_real rve_pick_idle(const double *idle_until, const uint32_t *incoming, int lane0) {
+#if defined(RVE_ISA_AVX512)
+  const __m256i at = _mm256_load_si256((const __m256i *)(const void *)(incoming + lane0));
+  return _mm512_i32gather_pd(_mm256_srli_epi32(at, __builtin_ctz(RVE_PACK * RVE_REACTION)), idle_until, 8);
+#elif defined(RVE_ISA_AVX2)
+  const __m128i at = _mm_load_si128((const __m128i *)(const void *)(incoming + lane0));
+  return _mm256_i32gather_pd(idle_until, _mm_srli_epi32(at, __builtin_ctz(RVE_PACK * RVE_REACTION)), 8);
+#else
+  return idle_until[incoming[lane0 + RVE_LANE] / (RVE_PACK * RVE_REACTION)];
 #endif
 }
 

@@ -34,7 +34,7 @@ enum { RVE_LIST_GOOD, RVE_LIST_CHECK /* its running bound is spent */, RVE_LIST_
 typedef struct RveCounts {
   int32_t dimension, grains, lanes, blocks;
   int32_t slot_rows, incoming_rows; /* capacity, in rows of `lanes` */
-  int32_t row;                      /* doubles per grain's row, a multiple of 4; 0: no rows */
+  int32_t row;                      /* doubles per grain's row; 0: no rows */
   int32_t reaction; /* doubles per slot's reaction: 4 in FP64, 2 in FP32, half as many more in 3D or RVE_WHOLE; 0: arrays */
 } RveCounts;
 
@@ -76,7 +76,8 @@ typedef struct RveArrays {
   uint32_t *neighbour; /* [slot] j (times counts.row if rows exist); one row more than the list has */
   uint16_t *image;     /* [slot] P, 4 bits per direction, and RVE_IMAGE flags */
   double *shear[3];    /* [slot] tangential spring force on the owner, N; 2D: [0], along (-n_y, n_x) */
-  double *branch[3];   /* [slot] x_j - x_i, m, if rve_carries(); of rows that did not rest in the last contact pass */
+  double *branch[3];   /* [slot] x_j - x_i, m, if rve_carries(); of rows that did not rest in the last contact pass. Mixed precision: as
+                          sums of two FP32 numbers, of each row all first and then all second ones */
   double *reaction;    /* [slot + lanes] force and torque on the neighbour, at rve_reaction_at() of the slot: a plane of four
                           numbers each (2D f t, 3D f t_x), in 3D one of two (t_y t_z), or both together (RVE_WHOLE); the
                           last slots stay zero */
@@ -141,8 +142,8 @@ RVE_ANY void *rve_carve(void *base, size_t *used, size_t bytes) {
   return at;
 }
 
-/* 1 if kernels of these counts carry branches along: FP64 on CPUs. (Rows were longer before they did.) */
-RVE_ANY int rve_carries(const RveCounts *n) { return n->reaction >= 4 && n->row == 4 * (n->dimension - 1); }
+/* 1 if kernels of these counts carry branches along: vector instructions of CPUs. (Rows were longer before they did.) */
+RVE_ANY int rve_carries(const RveCounts *n) { return n->row > 0 && n->row == (n->reaction < 4 ? 2 : 4) * (n->dimension - 1); }
 
 /* Doubles of a slot in the first plane of reactions; half as many in the second, if there is one. */
 RVE_ANY int rve_reaction_width(const RveCounts *n) {

@@ -283,7 +283,7 @@ enum { RVE_SUM_AHEAD = 1 };
 enum { RVE_SUM_AHEAD = RVE_CHUNK };
 #endif
 /* 1 where branches are carried along from step to step, see near_find_branch(), and positions give them anew every RVE_FRESH steps. */
-#if (defined(RVE_ISA_AVX512) || defined(RVE_ISA_AVX2)) && !defined(RVE_MIXED)
+#if defined(RVE_ISA_AVX512) || defined(RVE_ISA_AVX2)
 #define RVE_CARRIES 1
 #else
 #define RVE_CARRIES 0
