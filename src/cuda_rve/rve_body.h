@@ -85,6 +85,18 @@ RVE_FN void rve_neighbour_position(int dim, const RveArrays *a, int lane0, RveBo
         rve_int_from_bits(rve_pick((const double *)(const void *)a->position[k], a->neighbour, lane0, rve_row_doubles(dim)));
 }
 
+/* All of the neighbours, in FP64. */
+RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  const int row = rve_row_doubles(ft.dimension);
+  RveBody other;
+  rve_neighbour_position(ft.dimension, a, lane0, &other);
+  for (int k = 0; k < ft.dimension; k++) other.v[k] = rve_pick(a->velocity[k], a->neighbour, lane0, row);
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) other.w[k] = rve_pick(a->spin[k], a->neighbour, lane0, row);
+  other.r = rve_pick(a->radius, a->neighbour, lane0, row);
+  if (ft.viscous) other.m = rve_pick(a->mass, a->neighbour, lane0, row);
+  return other;
+}
+
 /* Branches from positions. The owners' are read again: kept for this seldom use, they would take room from what each row wants (4 % in
  * 2D). */
 RVE_FN void rve_branch_of_positions(int dim, const rve_real h[9], const RveArrays *a, int own0, int lane0, rve_int image,
@@ -95,14 +107,26 @@ RVE_FN void rve_branch_of_positions(int dim, const rve_real h[9], const RveArray
   rve_branch(dim, h, i.s, j.s, image, d);
 }
 
-#ifndef RVE_MIXED
-/* ------------------------------------------------------------------------------------------------------------- FP64 */
+/* ----------------------------------------------------------------------------------- grains as contacts want them */
 
+#ifdef RVE_MIXED
+typedef struct RveNearBody {
+  int lane0;
+  rve_near v[3], w[3], r, m;
+} RveNearBody;
+
+RVE_FN rve_near near_dot(int dim, const rve_near a[3], const rve_near b[3]) {
+  rve_near c = a[0] * b[0] + a[1] * b[1];
+  if (dim == 3) c = c + a[2] * b[2];
+  return c;
+}
+#else
 typedef RveBody RveNearBody;
-#define near_own_body rve_own_body
 #define near_dot rve_dot
+#endif
 
 #if !RVE_CARRIES /* CUDA and plain code: arrays are read, positions give all branches */
+#define near_own_body rve_own_body
 /* Places and radii of neighbours; then the rest. */
 RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
   rve_neighbour_position(ft.dimension, a, lane0, other);
@@ -128,43 +152,58 @@ RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_re
 }
 
 #else
+RVE_FN RveNearBody near_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
+  RveNearBody own;
+  own.lane0 = lane0;
+  for (int k = 0; k < ft.dimension; k++) own.v[k] = near_load(a->velocity[k], lane0);
+  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) own.w[k] = near_load(a->spin[k], lane0);
+  own.r = near_load(a->radius, lane0);
+  if (ft.viscous) own.m = near_load(a->mass, lane0);
+  return own;
+}
+
 /* Velocities and radii of neighbours (2D: and all else); then the rest. */
-RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
-  const RveQuad q = rve_gather(a->row, a->neighbour, lane0);
+RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
+  const NearQuad q = near_gather(a->row, a->neighbour, lane0);
   for (int k = 0; k < ft.dimension; k++) other->v[k] = q.f[k];
   if (ft.dimension == 2) other->w[0] = q.f[2];
   other->r = q.f[3];
-  if (ft.dimension == 2 && ft.viscous) other->m = rve_pick(a->mass, a->neighbour, lane0, rve_row_doubles(2));
+  if (ft.dimension == 2 && ft.viscous) other->m = near_pick(a->mass, a->neighbour, lane0, rve_row_doubles(2));
 }
-RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveBody *other) {
+RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
   if (ft.dimension == 2) return;
-  const RveQuad q = rve_gather(a->row + 4, a->neighbour, lane0);
+  const NearQuad q = near_gather(a->row + rve_row_doubles(3) / 2, a->neighbour, lane0);
   for (int k = 0; k < 3; k++) other->w[k] = q.f[k];
   other->m = q.f[3];
 }
 
 /* Of what near_neighbour_place has read, what is still needed once the branch is known. */
-RVE_FN void near_keep_place(RveFeatures ft, const RveBody *other, RveBody *kept) {
+RVE_FN void near_keep_place(RveFeatures ft, const RveNearBody *other, RveNearBody *kept) {
   kept->r = other->r;
   if (ft.dimension == 3) return;
   kept->w[0] = other->w[0];
   if (ft.viscous) kept->m = other->m;
 }
 
-/* Writes the rows of the pack at lane0. */
+/* Writes the rows of the span at lane0. */
 RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
-  double *const none[4] = {0, 0, 0, 0};
   const int stride = rve_row_doubles(dimension);
+  double *const row = a->row + (size_t)lane0 * (size_t)stride;
   if (dimension == 2) {
     const RveQuad q = {{b->v[0], b->v[1], b->w[0], b->r}};
-    rve_scatter(a->row, stride, none, lane0, q);
+    near_scatter(row, stride, q);
     return;
   }
   const RveQuad q = {{b->v[0], b->v[1], b->v[2], b->r}}, p = {{b->w[0], b->w[1], b->w[2], b->m}};
-  rve_scatter(a->row, stride, none, lane0, q);
-  rve_scatter(a->row + 4, stride, none, lane0, p);
+  near_scatter(row, stride, q);
+  near_scatter(row + stride / 2, stride, p);
 }
+#endif
 
+#ifndef RVE_MIXED
+/* ------------------------------------------------------------------------------------------------------------- FP64 */
+
+#if RVE_CARRIES
 /* Branches d, and the relative velocities u of the fluctuations. */
 RVE_FN void near_find_branch(RveFeatures ft, const RveCarry *carry, const rve_real h[9], const RveArrays *a, const RveBody *own,
                              const RveBody *other, int lane0, rve_real u[3], rve_real d[3]) {
@@ -213,14 +252,6 @@ RVE_FN RveQuad rve_read_reaction_3d(const RveArrays *a, int lane0) {
 
 #endif
 
-RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveBody other;
-  rve_neighbour_position(ft.dimension, a, lane0, &other);
-  near_neighbour_place(ft, a, lane0, &other);
-  near_neighbour_motion(ft, a, lane0, &other);
-  return other;
-}
-
 RVE_FN void near_write_reaction(RveFeatures ft, const RveArrays *a, int lane0, const RvePair *p) {
   if (ft.dimension == 3) {
     rve_write_reaction_3d(ft, a, lane0, p);
@@ -241,76 +272,6 @@ RVE_FN void rve_read_reaction(int dim, const RveArrays *a, int lane0, rve_real f
 
 #else
 /* ------------------------------------------------------------------------------------------------------------- FP32 */
-
-typedef struct RveNearBody {
-  int lane0;
-  rve_near v[3], w[3], r, m;
-} RveNearBody;
-
-RVE_FN rve_near near_dot(int dim, const rve_near a[3], const rve_near b[3]) {
-  rve_near c = a[0] * b[0] + a[1] * b[1];
-  if (dim == 3) c = c + a[2] * b[2];
-  return c;
-}
-
-RVE_FN RveNearBody near_own_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  RveNearBody own;
-  own.lane0 = lane0;
-  for (int k = 0; k < ft.dimension; k++) own.v[k] = near_load(a->velocity[k], lane0);
-  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) own.w[k] = near_load(a->spin[k], lane0);
-  own.r = near_load(a->radius, lane0);
-  if (ft.viscous) own.m = near_load(a->mass, lane0);
-  return own;
-}
-
-/* Velocities and radii of neighbours (2D: and all else); then the rest. */
-RVE_FN void near_neighbour_place(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
-  rve_near q[4];
-  near_gather(a->row, a->neighbour + lane0, q);
-  for (int k = 0; k < ft.dimension; k++) other->v[k] = q[k];
-  if (ft.dimension == 2) other->w[0] = q[2];
-  other->r = q[3];
-  if (ft.dimension == 2 && ft.viscous)
-    other->m = near_join(_mm512_cvtpd_ps(rve_pick(a->mass, a->neighbour, lane0, rve_row_doubles(2))),
-                         _mm512_cvtpd_ps(rve_pick(a->mass, a->neighbour, lane0 + RVE_SPAN, rve_row_doubles(2))));
-}
-RVE_FN void near_neighbour_motion(RveFeatures ft, const RveArrays *a, int lane0, RveNearBody *other) {
-  rve_near q[4];
-  if (ft.dimension == 2) return;
-  near_gather(a->row + 2, a->neighbour + lane0, q);
-  for (int k = 0; k < 3; k++) other->w[k] = q[k];
-  other->m = q[3];
-}
-
-RVE_FN void near_keep_place(RveFeatures ft, const RveNearBody *other, RveNearBody *kept) {
-  kept->r = other->r;
-  if (ft.dimension == 3) return;
-  kept->w[0] = other->w[0];
-  if (ft.viscous) kept->m = other->m;
-}
-
-/* In FP64, from the arrays. */
-RVE_FN RveBody rve_neighbour_body(RveFeatures ft, const RveArrays *a, int lane0) {
-  const int row = rve_row_doubles(ft.dimension);
-  RveBody other;
-  rve_neighbour_position(ft.dimension, a, lane0, &other);
-  for (int k = 0; k < ft.dimension; k++) other.v[k] = rve_pick(a->velocity[k], a->neighbour, lane0, row);
-  for (int k = 0; ft.tangential && k < rve_spins(ft); k++) other.w[k] = rve_pick(a->spin[k], a->neighbour, lane0, row);
-  other.r = rve_pick(a->radius, a->neighbour, lane0, row);
-  if (ft.viscous) other.m = rve_pick(a->mass, a->neighbour, lane0, row);
-  return other;
-}
-
-RVE_FN void rve_write_rows(int dimension, const RveArrays *a, int lane0, const RveBody *b) {
-  const int stride = rve_row_doubles(dimension);
-  double *const row = a->row + (size_t)lane0 * (size_t)stride;
-  if (dimension == 2) {
-    near_scatter(row, stride, b->v[0], b->v[1], b->w[0], b->r);
-    return;
-  }
-  near_scatter(row, stride, b->v[0], b->v[1], b->v[2], b->r);
-  near_scatter(row + 2, stride, b->w[0], b->w[1], b->w[2], b->m);
-}
 
 /* Branches and relative velocities. A branch is the sum of two FP32 numbers: what it changes by in a step may be less than the last digit
  * of the first, which alone enters the contact. */

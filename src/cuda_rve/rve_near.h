@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* The numbers in which contacts are computed ("near"): the kernels' own, or with RVE_MIXED FP32 on twice the lanes.
  *
- * Mixed precision keeps positions in fixed point and motion and sums in FP64, but for those over the few contacts of a grain. Branches are carried along to 48 bits and come
- * from differences of positions, so that what enters a contact has a relative error of 6e-8 wherever the grains are. */
+ * Mixed precision keeps positions in fixed point and motion and sums in FP64, but for those over the few contacts of a grain.
+ * Branches come from differences of positions and are carried along to 48 bits, so that what enters a contact has a relative error of
+ * 6e-8 wherever the grains are. */
 #ifndef DEMPM_RVE_NEAR_H
 #define DEMPM_RVE_NEAR_H
 
@@ -38,6 +39,16 @@ typedef rve_mask near_mask;
 #define near_select rve_select
 #define near_keep rve_keep
 #define near_sum_wide(a) (a)
+#define NearQuad RveQuad
+#define near_gather rve_gather
+#define near_pick rve_pick
+#if RVE_CARRIES
+/* Writes four fields of the rows of a span. */
+RVE_FN void near_scatter(double *rows, int stride, RveQuad q) {
+  double *const none[4] = {0, 0, 0, 0};
+  rve_scatter(rows, stride, none, 0, q);
+}
+#endif
 #define NearFour RveFour
 #define NearTwo RveTwo
 #define near_four rve_four
@@ -123,9 +134,14 @@ RVE_FN void near_store_sum(double *a, int lane0, rve_near first, rve_near rest) 
   _mm512_store_ps(a + lane0, first), _mm512_store_ps(a + lane0 + 8, rest);
 }
 
-/* Four FP32 fields of the grains that `offset` names, in doubles. */
-RVE_FN void near_gather(const double *rows, const uint32_t *offset, rve_near field[4]) {
+typedef struct NearQuad {
+  rve_near f[4];
+} NearQuad;
+/* Four FP32 fields of the grains that `offset` names, in doubles, one per lane. */
+RVE_FN NearQuad near_gather(const double *rows, const uint32_t *offset, int lane0) {
+  NearQuad q;
   rve_near row[4]; /* 128-bit lane q of row[k] is that of slot 4 q + k */
+  offset += lane0;
   for (int k = 0; k < 4; k++) {
     row[k] = _mm512_castps128_ps512(near_row(rows + offset[k]));
     row[k] = _mm512_insertf32x4(row[k], near_row(rows + offset[4 + k]), 1);
@@ -136,12 +152,18 @@ RVE_FN void near_gather(const double *rows, const uint32_t *offset, rve_near fie
   const rve_real b = _mm512_castps_pd(_mm512_unpackhi_ps(row[0], row[1]));
   const rve_real c = _mm512_castps_pd(_mm512_unpacklo_ps(row[2], row[3]));
   const rve_real d = _mm512_castps_pd(_mm512_unpackhi_ps(row[2], row[3]));
-  field[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(a, c)), field[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
-  field[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(b, d)), field[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
+  q.f[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(a, c)), q.f[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
+  q.f[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(b, d)), q.f[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
+  return q;
 }
-/* Writes four fields of eight rows of `stride` doubles as FP32. */
-RVE_FN void near_scatter(double *rows, int stride, rve_real f0, rve_real f1, rve_real f2, rve_real f3) {
-  const __m256 a = _mm512_cvtpd_ps(f0), b = _mm512_cvtpd_ps(f1), c = _mm512_cvtpd_ps(f2), d = _mm512_cvtpd_ps(f3);
+RVE_FN rve_near near_pick(const double *field, const uint32_t *neighbour, int lane0, int row) {
+  return near_join(_mm512_cvtpd_ps(rve_pick(field, neighbour, lane0, row)),
+                   _mm512_cvtpd_ps(rve_pick(field, neighbour, lane0 + RVE_SPAN, row)));
+}
+/* Writes four fields of the rows of a span, as FP32. */
+RVE_FN void near_scatter(double *rows, int stride, RveQuad q) {
+  const __m256 a = _mm512_cvtpd_ps(q.f[0]), b = _mm512_cvtpd_ps(q.f[1]);
+  const __m256 c = _mm512_cvtpd_ps(q.f[2]), d = _mm512_cvtpd_ps(q.f[3]);
   const __m256d ab0 = _mm256_castps_pd(_mm256_unpacklo_ps(a, b)), ab1 = _mm256_castps_pd(_mm256_unpackhi_ps(a, b));
   const __m256d cd0 = _mm256_castps_pd(_mm256_unpacklo_ps(c, d)), cd1 = _mm256_castps_pd(_mm256_unpackhi_ps(c, d));
   /* halves of row[k] are rows k and k + 4 */
