@@ -53,6 +53,12 @@ RVE_FN void rve_add_fourth(int dim, rve_real sum[15], const rve_real n[3], rve_r
     }
 }
 
+/* |a|, also of 0. Roots and quotients would take longer than all else here. */
+RVE_FN rve_real rve_norm(int dim, const rve_real a[3]) {
+  const rve_real square = rve_dot(dim, a, a);
+  return rve_keep(rve_less(rve_set(0.0), square), square * rve_inverse_sqrt(square));
+}
+
 /* One row of slots. The force is that of the last contact pass, read back from the reactions. */
 RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real h[9], const RveArrays *a,
                             const RveBody *own, int lane0, RveSums *sum) {
@@ -62,14 +68,15 @@ RVE_FN void rve_sum_contact(RveFeatures ft, const RveCall *call, const rve_real 
   const rve_real zero = rve_set(0.0), one = rve_set(1.0);
   rve_real d[3], n[3], f[3];
   rve_branch(dim, h, own->s, other.s, image, d);
-  const rve_real length = rve_sqrt(rve_dot(dim, d, d)), overlap = own->r + other.r - length;
+  const rve_real square = rve_dot(dim, d, d), inverse = rve_inverse_sqrt(square), length = square * inverse;
+  const rve_real overlap = own->r + other.r - length;
   const rve_mask bonded = rve_int_any_bit(image, rve_set_int(RVE_IMAGE_BOND));
   const rve_mask touch = rve_or(rve_less(zero, overlap), bonded);
-  for (int k = 0; k < dim; k++) n[k] = rve_keep(touch, d[k] / length), d[k] = rve_keep(touch, d[k]);
+  for (int k = 0; k < dim; k++) n[k] = rve_keep(touch, d[k] * inverse), d[k] = rve_keep(touch, d[k]);
   rve_read_reaction(dim, a, lane0, f);
   for (int k = 0; k < dim; k++) f[k] = zero - f[k];
   rve_add_dyad(dim, sum->of.stress, f, d);
-  sum->of.force = sum->of.force + rve_sqrt(rve_dot(dim, f, f));
+  sum->of.force = sum->of.force + rve_norm(dim, f);
   rve_add_dyad(dim, sum->of.fabric, n, n);
   const rve_real l = rve_keep(touch, length);
   if (call->thermal) { /* h l l with h = 1/(alpha |l|) */
@@ -98,7 +105,7 @@ RVE_FN void rve_sum_grains(RveFeatures ft, const RveHead *head, const RveArrays 
   if (!flew) {
     rve_sum_reactions(ft, head, a, lane0, f, t);
     for (int k = 0; k < dim; k++) f[k] = f[k] + rve_load(a->force[k], lane0);
-    sum->of.resultant = sum->of.resultant + rve_sqrt(rve_dot(dim, f, f));
+    sum->of.resultant = sum->of.resultant + rve_norm(dim, f);
   }
   rve_add_dyad(dim, sum->of.stress, p, own->v);
   sum->of.kinetic = sum->of.kinetic - half * rve_dot(dim, p, own->v);
@@ -111,40 +118,49 @@ RVE_FN void rve_sum_grains(RveFeatures ft, const RveHead *head, const RveArrays 
   sum->of.solid = sum->of.solid + size;
 }
 
-/* Largest C_nnnn over axes, face and space diagonals, of the affine moduli C (eq. 58): (kn - kt) n n n n + kt n n
- * terms. */
+/* Where rve_add_fourth() puts the sum with n_x^x n_y^y. */
+RVE_FN int rve_fourth_at(int x, int y) { return (4 - x) * (5 - x) / 2 + 4 - x - y; }
+
+/* Sums of l^2 n_i n_j: traces of the fourth moments. */
+RVE_FN void rve_second_moments(const double fourth[15], double second[9]) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      second[3 * i + j] = 0.0;
+      for (int k = 0; k < 3; k++) {
+        int e[3] = {0, 0, 0};
+        e[i]++, e[j]++, e[k] += 2;
+        second[3 * i + j] += fourth[rve_fourth_at(e[0], e[1])];
+      }
+    }
+}
+
+/* C_mmmm of the affine moduli C (eq. 58), times the volume: (kn - kt) sum l^2 (n m)^4 + kt sum l^2 (n m)^2. */
+RVE_FN double rve_modulus_along(const RveCall *call, const double fourth[15], const double second[9], const double m[3]) {
+  const double many[15] = {1.0, 4.0, 4.0, 6.0, 12.0, 6.0, 4.0, 12.0, 12.0, 4.0, 1.0, 4.0, 6.0, 4.0, 1.0}; /* 4!/(x! y! z!) */
+  double power[3][5], four = 0.0, two = 0.0;
+  for (int k = 0; k < 3; k++) {
+    power[k][0] = 1.0;
+    for (int e = 1; e < 5; e++) power[k][e] = power[k][e - 1] * m[k];
+  }
+  int at = 0;
+  for (int x = 4; x >= 0; x--)
+    for (int y = 4 - x; y >= 0; y--, at++) four += many[at] * power[0][x] * power[1][y] * power[2][4 - x - y] * fourth[at];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) two += m[i] * m[j] * second[3 * i + j];
+  return (call->normal_stiffness - call->tangential_stiffness) * four + call->tangential_stiffness * two;
+}
+
+/* The largest over axes, face and space diagonals. */
 RVE_FN double rve_largest_modulus(const RveCall *call, int dim, const double fourth[15], double volume) {
-  const double factorial[5] = {1.0, 1.0, 2.0, 6.0, 24.0};
-  double largest = 0.0;
+  double second[9], largest = 0.0;
+  rve_second_moments(fourth, second);
   for (int x = 0; x <= 1; x++)
     for (int y = -1; y <= 1; y++)
       for (int z = dim == 3 ? -1 : 0; z <= (dim == 3 ? 1 : 0); z++) {
         if (x == 0 && y == 0 && z == 0) continue;
         const double norm = 1.0 / sqrt((double)(x * x + y * y + z * z)), m[3] = {x * norm, y * norm, z * norm};
-        double four = 0.0, two = 0.0;
-        int at = 0;
-        for (int ex = 4; ex >= 0; ex--)
-          for (int ey = 4 - ex; ey >= 0; ey--, at++) {
-            const int ez = 4 - ex - ey, e[3] = {ex, ey, ez};
-            double product = 24.0 / (factorial[ex] * factorial[ey] * factorial[ez]);
-            for (int k = 0; k < 3; k++)
-              for (int i = 0; i < e[k]; i++) product *= m[k];
-            four += product * fourth[at];
-            /* sum l^2 n_i n_j m_i m_j = the same with |n|^2 = |m|^2 = 1 */
-            double pairs = 0.0;
-            for (int i = 0; i < 3; i++)
-              for (int j = 0; j < 3; j++) {
-                int rest[3] = {ex, ey, ez};
-                rest[i]--, rest[j]--;
-                for (int k = 0; k < 3; k++)
-                  if (rest[k] == 2 && rest[0] + rest[1] + rest[2] == 2 && rest[0] >= 0 && rest[1] >= 0 && rest[2] >= 0)
-                    pairs += m[i] * m[j];
-              }
-            two += pairs * fourth[at];
-          }
-        const double c =
-            (call->normal_stiffness - call->tangential_stiffness) * four + call->tangential_stiffness * two;
-        largest = c / volume > largest ? c / volume : largest;
+        const double c = rve_modulus_along(call, fourth, second, m) / volume;
+        largest = c > largest ? c : largest;
       }
   return largest;
 }
@@ -202,7 +218,7 @@ RVE_FN void rve_measure(RveFeatures ft, const RveTeam *team, const RveCall *call
     const int block = span / RVE_PARTS, part = span % RVE_PARTS * RVE_SPAN;
     const RveBody own = rve_own_body(all, a, span * RVE_SPAN);
     for (int row = a->slot_first[block]; row < a->slot_first[block + 1] && !flew; row++)
-      rve_sum_contact(ft, call, h, a, &own, row * RVE_PACK + part, &sum);
+      if (!(head->approach < a->idle_until[row])) rve_sum_contact(ft, call, h, a, &own, row * RVE_PACK + part, &sum);
     rve_sum_grains(ft, head, a, span * RVE_SPAN, &own, flew, &sum);
   }
   RveTotals total;
