@@ -4,7 +4,7 @@
 
 #include <unistd.h>
 
-#include "cuda_rve/rve_replay.h"
+#include "cuda_rve/rve_batch_private.h"
 
 static const char *const file = "test_watchdog.replay";
 
@@ -90,7 +90,7 @@ static void a_cell_that_closes_is_named(void **state) {
   rve_packing_destroy(&packing);
 }
 
-/* steps per call: states of short calls are kept because the grains move, those of long ones always. */
+/* steps per call: states of short calls are kept because of the time step, those of long ones always. */
 static void replay_repeats(int steps) {
   RveScene scene;
   RveFailure failure, again;
@@ -136,6 +136,42 @@ static void a_replay_repeats_the_failure_bit_for_bit(void **state) {
   replay_repeats(400);
 }
 
+/* Is the state kept before a call of so many steps of so much of the critical step, in which a crystal's grain moves by `moved` of its
+ * radius per step, the cell strains by `strain`, and temperature changes by `heat`? */
+static int is_kept(int steps, double share, double moved, double strain, double heat) {
+  RvePacking packing = help_crystal(HELP_SQUARE, 4, 5e-3, 0.01);
+  RveScene scene = help_scene(2);
+  RveInput input;
+  RveCall call;
+  help_heat(&scene);
+  scene.expansion = 1e-4;
+  scene.time_step = share * rve_critical_time_step(&scene, &packing);
+  MUST(BASE_ALLOC(3 * (size_t)packing.grains, &packing.velocity));
+  packing.velocity[0] = moved * packing.radius[0] / scene.time_step;
+  RveBatch *batch;
+  MUST(rve_batch_create(&scene, &packing, 1, NULL, 1, RVE_BACKEND_CPU, &batch));
+  const double duration = steps * scene.time_step;
+  memset(&input, 0, sizeof input);
+  input.velocity_gradient[0] = strain / duration;
+  input.temperature = rve_head(batch->record[0].arena)->temperature + heat;
+  MUST(rve_call_make(&scene, rve_head(batch->record[0].arena), &input, duration, &call));
+  assert_int_equal(call.steps, steps);
+  const int kept = rve_may_fail(batch, &batch->record[0], &call);
+  rve_batch_destroy(batch);
+  rve_packing_destroy(&packing);
+  return kept;
+}
+
+static void states_are_kept_before_calls_that_may_fail(void **state) {
+  (void)state;
+  assert_false(is_kept(10, 0.5, 0.008, 5e-4, 5.0));
+  assert_true(is_kept(10, 0.5, 0.012, 5e-4, 5.0));
+  assert_true(is_kept(10, 0.5, 0.008, 2e-3, 5.0));
+  assert_true(is_kept(10, 0.5, 0.008, 5e-4, 20.0));
+  assert_true(is_kept(10, 0.95, 0.0, 0.0, 0.0));
+  assert_true(is_kept(100, 0.5, 0.0, 0.0, 0.0));
+}
+
 static void keeping_states_changes_no_answer(void **state) {
   (void)state;
   RvePacking packing = help_random(2, 8, 2e4, 3);
@@ -178,6 +214,7 @@ int main(void) {
       cmocka_unit_test(a_velocity_that_is_not_finite_is_named),
       cmocka_unit_test(a_cell_that_closes_is_named),
       cmocka_unit_test(a_replay_repeats_the_failure_bit_for_bit),
+      cmocka_unit_test(states_are_kept_before_calls_that_may_fail),
       cmocka_unit_test(keeping_states_changes_no_answer),
       cmocka_unit_test(an_unpacked_state_forgets_the_failure),
   };
