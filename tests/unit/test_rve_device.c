@@ -105,15 +105,12 @@ static uint64_t digest(const RveAnswer answer[RVES]) {
   return sum;
 }
 
-static uint64_t digest_of_run(int dimension, Physics physics, RveAnswer answer[RVES]) {
-  RvePacking packing[SIZES];
+static uint64_t digest_of_run(int dimension, Physics physics, const RvePacking packing[SIZES], RveAnswer answer[RVES]) {
   const RveScene scene = scene_of(dimension, physics);
-  make_packings(dimension, packing);
   RveBatch *batch = make_batch(&scene, packing, RVE_BACKEND_CUDA);
   memset(answer, 0, RVES * sizeof *answer);
   run_calls(batch, &scene, 0, CALLS, answer);
   rve_batch_destroy(batch);
-  for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
   return digest(answer);
 }
 
@@ -125,20 +122,22 @@ static void answers_do_not_depend_on_where_states_lie(void **state) {
   for (int dimension = 2; dimension <= 3; dimension++) {
     const Physics physics = dimension == 2 ? BONDS : FRICTION;
     RveAnswer answer[RVES], by_one_warp[RVES];
-    const uint64_t first = digest_of_run(dimension, physics, answer), again = digest_of_run(dimension, physics, answer);
+    RvePacking packing[SIZES];
+    make_packings(dimension, packing); /* once: with DEMPM_BACKEND=cuda the device makes them, and settings would change them */
+    const uint64_t first = digest_of_run(dimension, physics, packing, answer), again = digest_of_run(dimension, physics, packing, answer);
     setenv("DEMPM_CUDA_WARPS", "1", 1); /* one for all grains of a packing; energies are summed in another order */
-    digest_of_run(dimension, physics, by_one_warp);
+    digest_of_run(dimension, physics, packing, by_one_warp);
     unsetenv("DEMPM_CUDA_WARPS");
     for (int k = 0; k < RVES; k++) assert_true(difference(&by_one_warp[k], &answer[k]) < 1e-12);
     setenv("DEMPM_CUDA_HOST_SHARED", "16000", 1); /* the smallest packing fits, the others do not */
-    const uint64_t outside = digest_of_run(dimension, physics, answer);
+    const uint64_t outside = digest_of_run(dimension, physics, packing, answer);
     unsetenv("DEMPM_CUDA_HOST_SHARED");
     setenv("DEMPM_CUDA_HOST_MEMORY", "100000", 1); /* not enough for the lists of all RVEs at once */
-    const uint64_t parts = digest_of_run(dimension, physics, answer);
+    const uint64_t parts = digest_of_run(dimension, physics, packing, answer);
     unsetenv("DEMPM_CUDA_HOST_MEMORY");
     setenv("DEMPM_CUDA_HOST_DEVICES", "2", 1);
     rve_device_share(3); /* the second of two */
-    const uint64_t second = digest_of_run(dimension, physics, answer);
+    const uint64_t second = digest_of_run(dimension, physics, packing, answer);
     rve_device_share(0);
     unsetenv("DEMPM_CUDA_HOST_DEVICES");
     print_message("           %dD: answers %016llx\n", dimension, (unsigned long long)first);
@@ -146,6 +145,7 @@ static void answers_do_not_depend_on_where_states_lie(void **state) {
     assert_true(outside == first);
     assert_true(parts == first);
     assert_true(second == first);
+    for (int k = 0; k < SIZES; k++) rve_packing_destroy(&packing[k]);
   }
 }
 
